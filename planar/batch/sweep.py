@@ -19,10 +19,10 @@ from planar.batch.assembly.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
+from planar.batch.named_results.design_forces import output_link
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
-from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reductions.reduced_sweep import (
     ReducedSweep,
     Reduction,
@@ -250,7 +250,7 @@ def _solve_blocks(
 ) -> Iterator[int]:
     """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
     plan = into.plan
-    parts = list(split_into_blocks(plan.design_count, into.block_size))
+    parts = list(split_into_blocks(plan.design_count, plan.block_size))
     whole = plan.all_designs
     missing = {k: part for k, part in enumerate(parts) if k not in into.finished}
     ready = plan.design_count - sum(part.stop - part.start for part in missing.values())

@@ -1,24 +1,24 @@
-"""A mechanism's equations with symbols for the numbers of its file: F(z, u, d) = 0, and the links' frames by them."""
+"""A mechanism's equations with symbols for the numbers of its file: F(z, u, d) = 0, and what moves and acts by them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from planar.derivatives.kinematic_slopes import GROUND_RATES, RatedMotion
 from planar.derivatives.parameters import INPUT_RATES, Parameters
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
-from planar.equations.residuals import scalars
+from planar.equations.residuals import input_positions, pair_residuals, scalars
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Scalar, value_and_rates
+from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
@@ -37,45 +37,33 @@ class DesignEquations:
         self.solver: PositionSolver = solved_mechanism(mechanism).solver
         self.mechanism, self.equations = mechanism, self.solver.equations
         self.dimensions, self.names = self.parameters.dimensions, self.parameters.names
-        own = len(self.parameters.file_dimensions)
+        file_count = len(self.parameters.file_dimensions)
         self.d = ca.SX.sym("d", len(self.dimensions))
-        symbols = [self.d[k] for k in range(own)]
-        self.work = LagrangianFunctions(self.parameters.mechanism_with(symbols), self.solver.unit)
-        for k, pair in enumerate(each for name in offsets for each in mechanism.pairs if each.name == name):
-            at = own + 2 * k
-            self.work.numbers[pair.name] = pair.offset_pin(
-                self.work.numbers[pair.name], Vector(self.d[at], self.d[at + 1])
-            )
+        symbols = scalars(self.d)
+        self.work = LagrangianFunctions(self.parameters.mechanism_with(symbols[:file_count]), self.solver.unit)
+        pairs = {pair.name: pair for pair in mechanism.pairs}
+        for k, name in enumerate(offsets):
+            offset = Vector(*symbols[file_count + 2 * k : file_count + 2 * k + 2])
+            self.work.numbers[name] = pairs[name].offset_pin(self.work.numbers[name], offset)
         count = len(mechanism.inputs)
         self.u, self.u1, self.u2 = (ca.SX.sym(name, count) for name in ("u", "u1", "u2"))
         self.t = ca.vertcat(self.u, self.u1, self.u2, self.d)
         self.z = self.equations.z
         self.z1, self.z2 = (ca.SX.sym(name, self.z.numel()) for name in ("z1", "z2"))
-        self.F, self.w = self._equations_of_design()
-
-    def _equations_of_design(self) -> tuple[ca.SX, ca.SX]:
-        """F, and w in m and rad."""
-        unit = self.solver.unit
         numbers = [
             number
-            for pair in self.mechanism.pairs
-            for number in scale_lengths(self.work.numbers[pair.name], pair.number_kinds, unit)
+            for pair in mechanism.pairs
+            for number in scale_lengths(self.work.numbers[pair.name], pair.number_kinds, self.solver.unit)
         ]
-        p = ca.vertcat(ca.SX(0, 1), *numbers)
-        scaled = self.u / ca.DM(self.input_scale)
-        F, w = self.equations.as_function()(self.z, scaled, p)
-        return F, w * ca.DM(self.solver.scale)
+        scaled_inputs = self.u / ca.DM(self.input_scale)
+        self.F, w = self.equations.as_function()(self.z, scaled_inputs, stack_expressions(numbers))
+        self.w = w * ca.DM(self.solver.scale)
 
     @cached_property
     def input_scale(self) -> Array:
         """What inputs are in units of (inputs,): m, rad."""
         kinds = self.equations.input_kinds
         return np.array([self.solver.unit if kind is MeasureKind.LENGTH else 1.0 for kind in kinds])
-
-    @property
-    def scale(self) -> Array:
-        """What each of t is in units of (parameters,): see `Parameters.scale`."""
-        return self.parameters.scale
 
     def rates(self, value: ca.SX) -> tuple[ca.SX, ca.SX]:
         """The first and second rates of what is made of z, u and d."""
@@ -90,48 +78,110 @@ class DesignEquations:
         return frames_from_coordinates(scalars(self.w), solver.column, list(solver.shapes), solver.pairs)
 
     @cached_property
-    def link_coordinates(self) -> ca.SX:
-        """The coordinates of `LagrangianFunctions` (q,) in the unknowns."""
-        frames, own = self.placed
-        parts = [getattr(frames[link], part) for link in self.work.links for part in FRAME_PARTS]
-        parts += [each for pair in self.mechanism.pairs for each in own[pair.name]]
-        return stack_expressions(parts)
+    def motion(self) -> SymbolicMotion:
+        """The positions of the links with their rates, in symbols."""
+        return SymbolicMotion(self)
 
-    def in_link_coordinates(self, value: ca.SX) -> ca.SX:
+    @cached_property
+    def _columns(self) -> list[int]:
+        """Where in w each of the coordinates q of `LagrangianFunctions` stands."""
+        column = self.solver.column
+        columns = [column[link, part] for link in self.work.links for part in FRAME_PARTS]
+        return columns + [column[pair.name, part] for pair in self.mechanism.pairs for part, _ in pair.coordinate_kinds]
+
+    def in_unknowns(self, value: ca.SX) -> ca.SX:
         """An expression in the coordinates q of `LagrangianFunctions`, in the unknowns."""
-        return ca.Function("value", [self.work.q, self.d], [value])(self.link_coordinates, self.d)
+        return ca.substitute(value, self.work.q, self.w[self._columns])
 
     def coordinates_at(self, moving: KinematicResult) -> tuple[list[Array], Array]:
         """z, z', z'' (n, unknowns) and t (n, parameters) at a state or a motion."""
-        inputs = [moving.inputs[given.pair] for given in self.mechanism.inputs]
-        given = [[np.asarray(getattr(each, rate), float) for each in inputs] for rate in INPUT_RATES]
-        z = self.unknowns_at(moving)
-        many = max(len(z[0]), *(np.size(part) for each in given for part in each), 1)
-        z = [np.broadcast_to(each, (many, each.shape[1])) for each in z]
-        values = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in given])
-        t = np.concatenate(
-            [values.reshape(-1, many).T, np.tile([each.value for each in self.dimensions], (many, 1))], 1
-        )
+        inputs = [moving.inputs[driven.pair] for driven in self.mechanism.inputs]
+        input_rates = [np.asarray(getattr(motion, rate), float) for rate in INPUT_RATES for motion in inputs]
+        coordinates = self.work.coordinates(moving)
+        count = max(len(coordinates[0]), *(rate.size for rate in input_rates), 1)
+        unknowns = list(self.equations.unknowns)
+        z: list[Array] = []
+        for rate in coordinates:
+            w: Array = np.empty((count, len(self._columns)))
+            w[:, self._columns] = rate
+            z.append(w[:, unknowns] / self.solver.scale[unknowns])
+        t: Array = np.empty((count, len(self.names)))
+        for column, rate in enumerate(input_rates):
+            t[:, column] = rate
+        t[:, len(input_rates) :] = [dimension.value for dimension in self.dimensions]
         return z, t
-
-    def unknowns_at(self, moving: KinematicResult) -> list[Array]:
-        """z, z', z'' (n, unknowns) at positions that have rates."""
-        parts = [_parts_of(moving, each.owner, each.part, self.solver.pairs) for each in self.equations.coordinates]
-        many = max((np.size(part) for each in parts for part in each), default=1)
-        w = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts]).reshape(-1, 3, many)
-        unknown = list(self.equations.unknowns)
-        return list((w[unknown] / self.solver.scale[unknown, None, None]).transpose(1, 2, 0))
-
-
-def _parts_of(moving: KinematicResult, owner: str, part: str, pairs: Mapping[str, Pair]) -> tuple[Any, ...]:
-    """A coordinate with its two rates."""
-    if part in FRAME_PARTS and owner in moving.frames:
-        return value_and_rates(getattr(moving.frames[owner], part))[:3]
-    names = [name for name, _ in pairs[owner].coordinate_kinds]
-    return value_and_rates(moving.own[owner][names.index(part)])[:3]
 
 
 @lru_cache(maxsize=32)
 def design_equations(mechanism: Mechanism, offsets: tuple[str, ...] = ()) -> DesignEquations:
     """The equations of a mechanism, kept for the next time."""
     return DesignEquations(mechanism, offsets)
+
+
+class SymbolicMotion(RatedMotion):
+    """Positions of links with two rates, as expressions in the unknowns, the inputs, their rates and the numbers."""
+
+    orders = 3
+
+    def __init__(self, design: DesignEquations):
+        self.design, self.mechanism, self.shapes = design, design.work.mechanism, design.work.shapes
+        self._rates: dict[str, Sequence[Sequence[Scalar]]] = {}
+
+    @property
+    def size(self) -> float:
+        return self.design.solver.unit
+
+    def frame(self, link: str) -> Frame:
+        return self.design.placed[0][link]
+
+    def frame_rates(self, link: str) -> Sequence[Sequence[Scalar]]:
+        if link == self.mechanism.frame:
+            return GROUND_RATES
+        if link not in self._rates:
+            parts = stack_expressions(self.frame(link)[:5])
+            self._rates[link] = [scalars(rate) for rate in (parts, *self.design.rates(parts))]
+        return self._rates[link]
+
+    def input_position(self, pair: Pair) -> Jet:
+        """The position of a relative motion with its rates."""
+        (position,) = input_positions([pair], self.frames, self.design.work.numbers, self.design.placed[1])
+        position = ca.SX(position)
+        return Jet(position, *self.design.rates(position))
+
+
+class OutputBalance:
+    """The balance of weightless links under an effort of one at the pair of an output, `acting` = 0 in z, u and d.
+
+    It is linear in the `unknowns`: the multipliers of the pairs' constraints, where teeth touch the force that drives,
+    then the efforts of the inputs.
+    """
+
+    def __init__(self, design: DesignEquations, output: Pair):
+        self.design = design
+        work, pairs = design.work, design.work.mechanism.pairs
+        residuals: dict[str, list[ca.SX]] = {pair.name: [] for pair in pairs}
+        for row, residual in pair_residuals(pairs, work.frames, work.numbers, work.own):
+            residuals[row.pair].append(residual)
+        actions, multipliers = {}, []
+        for pair in pairs:
+            own_multipliers = ca.SX.sym("l", len(residuals[pair.name]))
+            multipliers.append(own_multipliers)
+            contact = pair.tooth_contact(work.frames, work.shapes, pairs)
+            if contact is None:
+                action = ca.jtimes(ca.vertcat(*residuals[pair.name]), work.q, own_multipliers, True)
+            else:
+                senses = dict(zip(pair.links, (-1.0, 1.0), strict=True))
+                unit = work.unit_action_on_links(senses, contact.pitch_point, contact.drive_direction)
+                action = own_multipliers[0] * unit
+            actions[pair.name] = design.in_unknowns(action)
+        efforts = ca.SX.sym("e", len(design.mechanism.inputs))
+        acting = work.unit_effort_on_links(output.name)
+        for k, driven in enumerate(design.mechanism.inputs):
+            acting += efforts[k] * work.unit_effort_on_links(driven.pair)
+        self.unknowns, self._actions = stack_expressions([*multipliers, efforts]), actions
+        self.acting = sum(actions.values(), design.in_unknowns(acting))
+
+    def force_on(self, name: str, link: str) -> Vector:
+        """The force of a pair on one of its moving links."""
+        first, action = self.design.work.link_columns[link], self._actions[name]
+        return Vector(action[first], action[first + 1])

@@ -12,8 +12,8 @@ parameters, S = dx/dt, is enclosed by S = -Y F_t + (1 - Y F_x) S over the same b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -24,16 +24,16 @@ from planar.derivatives.intervals import (
     TINY,
     Balls,
     Intervals,
-    apply_to_intervals,
     down,
+    evaluate_intervals,
     exact,
     mean_of_balls,
     to_balls,
     up,
 )
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.generic_evaluation import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import BadInput
 from planar.foundation.generalised_inverses import invert_matrices
 
 START_STEPS = 2
@@ -87,61 +87,65 @@ class ParameterBoxes(NamedTuple):
 
 class Enclosures(NamedTuple):
     """What is proved over boxes of parameters: of every lane, whether there is one solution for all of them, within
-    `radius` of `middle` (lanes, unknowns) and no other within `reach`; balls (lanes, results, columns) of how results
-    move with the parameters `columns`; and how unknowns do at the middle, as floats (lanes, unknowns, columns)."""
+    `radius` of `middle` (lanes, unknowns) and no other within `reach`; middles and radii (lanes, results, columns) of
+    how results move with the parameters `columns`; and how unknowns do at the middle, as floats (lanes, unknowns,
+    columns)."""
 
     is_proved: BoolArray
     middle: Array
     radius: Array
     reach: Array
-    slopes: Balls
+    slope_middle: Array
+    slope_radius: Array
     tangents: Array
+
+    @property
+    def slopes(self) -> Balls:
+        """How results move with the parameters, as balls."""
+        return Balls(self.slope_middle, self.slope_radius)
 
     def holds(self, other: Enclosures) -> BoolArray:
         """Whether the solutions of another lie where these are the only ones (lanes,)."""
-        inside = np.abs(other.middle - self.middle) * OVER + other.radius < self.reach
-        found: BoolArray = self.is_proved & other.is_proved & inside.all(axis=1)
-        return found
+        is_inside = np.abs(other.middle - self.middle) * OVER + other.radius < self.reach
+        holds: BoolArray = self.is_proved & other.is_proved & is_inside.all(axis=1)
+        return holds
 
     def rows(self, which: Lanes) -> Enclosures:
         """Those of some lanes."""
-        proved, middle, radius, reach, slopes, tangents = self
-        parts = Balls(slopes.middle[which], slopes.radius[which])
-        return Enclosures(proved[which], middle[which], radius[which], reach[which], parts, tangents[which])
+        arrays: Iterator[Any] = (array[which] for array in self)
+        return Enclosures(*arrays)
 
     @staticmethod
     def stack(parts: Sequence[Enclosures]) -> Enclosures:
         """Those of several."""
-        proved, middle, radius, reach, balls, tangents = zip(*parts, strict=True)
-        slopes = Balls(*(np.concatenate(each) for each in zip(*balls, strict=True)))
-        middles, radii, reaches = (np.concatenate(each) for each in (middle, radius, reach))
-        return Enclosures(np.concatenate(proved), middles, radii, reaches, slopes, np.concatenate(tangents))
+        return Enclosures(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class ParametricSystem:
     """Equations F(x, t) = 0, as many as unknowns, and results r(x, t), whose slopes in `columns` of t are wanted.
 
-    Raises KeyError, with the name of a casadi operation, where there are some of which no intervals are known, or that
-    jump.
+    Raises BadInput where there are operations of which no intervals are known, or that jump.
     """
 
     def __init__(self, x: ca.SX, t: ca.SX, equations: ca.SX, results: ca.SX, columns: Sequence[int]):
         self.columns = list(columns)
         self.count, self.parts = x.numel(), results.numel()
-        by = ca.vertcat(ca.SX(0, 1), *(t[k] for k in self.columns))
-        slopes = [ca.jacobian(each, of) for each in (equations, results) for of in (x, by)]
-        self._slopes = ca.Function("slopes", [x, t], [ca.densify(each) for each in slopes])
-        self._left = ca.Function("left", [x, t], [ca.densify(equations)])
-        self._step = BufferedFunction(
-            ca.Function("step", [x, t], [ca.densify(slopes[0]), ca.densify(slopes[1]), equations])
-        )
+        varying = ca.vertcat(ca.SX(0, 1), *(t[k] for k in self.columns))
+        slopes = [ca.densify(ca.jacobian(of, by)) for of in (equations, results) for by in (x, varying)]
+        self._slopes = ca.Function("slopes", [x, t], slopes)
+        self._residual = ca.Function("residual", [x, t], [ca.densify(equations)])
+        self._step = BufferedFunction(ca.Function("step", [x, t], [slopes[0], slopes[1], equations]))
         names = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
         values = ca.Function("values", [x, t], [equations, results])
         for function, jumps in ((values, [ca.OP_SIGN]), (self._slopes, [])):
             for k in range(function.n_instructions()):
                 code = function.instruction_id(k)
                 if (code not in INTERVAL_OPERATIONS and names[code] not in HELD) or code in jumps:
-                    raise KeyError(names[code].removeprefix("OP_").lower())
+                    operation = names[code].removeprefix("OP_").lower()
+                    raise BadInput(
+                        "guaranteed",
+                        f"guaranteed bands are not told of this mechanism, whose formulas have a {operation!r} in them",
+                    )
 
     def enclose(self, boxes: ParameterBoxes, start: Array, steps: int = START_STEPS) -> Enclosures:
         """What can be proved over boxes, of solutions at their middles that so many of Newton's steps from a start
@@ -151,64 +155,55 @@ class ParametricSystem:
             return Enclosures.stack([self._enclose_lanes(boxes.rows(part), start[part], steps) for part in parts])
 
     def _enclose_lanes(self, boxes: ParameterBoxes, start: Array, steps: int) -> Enclosures:
-        middle, tangents = self._find_middles(boxes, start, steps)
-        many = len(start)
-        left = self._left_open(middle, boxes.middle)
-        half = self._half_widths(boxes)
-        proved = np.zeros(many, dtype=bool)
-        reach = FIRST_GROWTH * (np.abs(tangents) @ half[:, :, None])[:, :, 0] + LEAST_REACH
-        inside = reach.copy()
-        alive = np.isfinite(reach).all(axis=1)
-        first = reach.copy()
+        count, t = len(start), boxes.middle
+        middle, tangents = self._find_middles(t, start, steps)
+        points = [[exact(column) for column in values.T] for values in (middle, t)]
+        residual = _stack_balls(evaluate_intervals(self._residual, points)[0], count, (self.count, 1))
+        half_widths = np.maximum(up(boxes.upper - t), up(t - boxes.lower))[:, self.columns]
+        first_reach = FIRST_GROWTH * (np.abs(tangents) @ half_widths[:, :, None])[:, :, 0] + LEAST_REACH
+        reach, radius = first_reach.copy(), first_reach.copy()
+        is_proved = np.zeros(count, dtype=bool)
+
+        def krawczyk_image(lanes: IntArray, reach: Array, nested: int) -> Array:
+            linear = self._linearise(middle[lanes], reach, boxes.rows(lanes), nested)
+            return linear.image(residual.rows(lanes), half_widths[lanes], reach)
+
         for nested in NESTED:
-            alive = np.isfinite(reach).all(axis=1) & ~proved
-            reach[alive] = first[alive]
+            is_alive = np.isfinite(reach).all(axis=1) & ~is_proved
+            reach[is_alive] = first_reach[is_alive]
             for _ in range(MAX_GROWTHS):
-                at = np.flatnonzero(alive & ~proved)
-                if not len(at):
+                lanes = np.flatnonzero(is_alive & ~is_proved)
+                if not len(lanes):
                     break
-                linear = self._linearise(middle[at], reach[at], boxes.rows(at), nested)
-                image = linear.image(Balls(left.middle[at], left.radius[at]), half[at], reach[at])
-                known = np.isfinite(image).all(axis=1) & (image < MAX_REACH).all(axis=1)
-                within = known & (image < SPARE * reach[at]).all(axis=1)
-                proved[at[within]], inside[at[within]] = True, image[within]
-                alive[at[~known]] = False
-                reach[at[~within]] = (GROWTH * image + LEAST_REACH)[~within]
-        slopes = Balls(*(np.full((many, self.parts, len(self.columns)), np.nan) for _ in range(2)))
-        found = np.flatnonzero(proved)
-        if len(found):
-            wide = found[(inside[found] > WIDE * first[found]).any(axis=1)]
+                image = krawczyk_image(lanes, reach[lanes], nested)
+                is_bounded = np.isfinite(image).all(axis=1) & (image < MAX_REACH).all(axis=1)
+                is_inside = is_bounded & (image < SPARE * reach[lanes]).all(axis=1)
+                is_proved[lanes[is_inside]], radius[lanes[is_inside]] = True, image[is_inside]
+                is_alive[lanes[~is_bounded]] = False
+                reach[lanes[~is_inside]] = (GROWTH * image + LEAST_REACH)[~is_inside]
+        slopes = Balls(*(np.full((count, self.parts, len(self.columns)), np.nan) for _ in range(2)))
+        proved = np.flatnonzero(is_proved)
+        if len(proved):
+            wide = proved[(radius[proved] > WIDE * first_reach[proved]).any(axis=1)]
             for _ in range(REFINEMENTS if len(wide) else 0):
-                linear = self._linearise(middle[wide], inside[wide], boxes.rows(wide), NESTED[-1])
-                image = linear.image(Balls(left.middle[wide], left.radius[wide]), half[wide], inside[wide])
-                inside[wide] = np.fmin(inside[wide], image)
-            linear = self._linearise(middle[found], inside[found], boxes.rows(found))
-            proved[found], (slopes.middle[found], slopes.radius[found]) = linear.slopes()
-            proved &= np.isfinite(slopes.radius).all(axis=(1, 2))
-        return Enclosures(proved, middle, inside, reach, slopes, tangents)
+                radius[wide] = np.fmin(radius[wide], krawczyk_image(wide, radius[wide], NESTED[-1]))
+            linear = self._linearise(middle[proved], radius[proved], boxes.rows(proved))
+            is_proved[proved], (slopes.middle[proved], slopes.radius[proved]) = linear.slopes()
+            is_proved &= np.isfinite(slopes.radius).all(axis=(1, 2))
+        return Enclosures(is_proved, middle, radius, reach, *slopes, tangents)
 
-    def _find_middles(self, boxes: ParameterBoxes, start: Array, steps: int) -> tuple[Array, Array]:
-        """Solutions at the middles and how they move with the columns, as floats have both."""
-        t, x = boxes.middle, start
+    def _find_middles(self, t: Array, start: Array, steps: int) -> tuple[Array, Array]:
+        """Solutions at the middles t and how they move with the columns, as floats have both."""
+        x = start
         inverse: Array = np.zeros((len(x), self.count, self.count))
-        by: Array = np.zeros((len(x), self.count, len(self.columns)))
+        by_columns: Array = np.zeros((len(x), self.count, len(self.columns)))
         for _ in range(steps):
-            slope, by, left = (each.transpose(0, 2, 1) for each in self._step.evaluate_batch(len(x), x, t))
-            inverse, is_singular = invert_matrices(slope)
-            x = x - (inverse @ left)[:, :, 0]
+            told = self._step.evaluate_batch(len(x), x, t)
+            jacobian, by_columns, residual = (part.transpose(0, 2, 1) for part in told)
+            inverse, is_singular = invert_matrices(jacobian)
+            x = x - (inverse @ residual)[:, :, 0]
             x[is_singular] = np.nan
-        return x, -inverse @ by
-
-    def _half_widths(self, boxes: ParameterBoxes) -> Array:
-        """Of the varying parameters, from the middle (lanes, columns)."""
-        middle = boxes.middle
-        both = np.maximum(up(boxes.upper - middle), up(middle - boxes.lower))
-        return both[:, self.columns]
-
-    def _left_open(self, middle: Array, t: Array) -> Balls:
-        """F at the middles (lanes, unknowns, 1)."""
-        given = [[exact(each) for each in values.T] for values in (middle, t)]
-        return _stack_balls(evaluate_function(self._left, given, exact, apply_to_intervals)[0], len(t), (self.count, 1))
+        return x, -inverse @ by_columns
 
     def _linearise(self, middle: Array, reach: Array, boxes: ParameterBoxes, nested: int = 1) -> _LinearLanes:
         """Over boxes, or the mean along straight ways from the middle, each part of which is in one of nested boxes."""
@@ -216,13 +211,12 @@ class ParametricSystem:
         parts = []
         for k in range(1, nested + 1):
             share = k / nested
-            x = [Intervals(down(at - far), up(at + far)) for at, far in zip(middle.T, up(share * reach.T), strict=True)]
-            t = [_interval(*both) for both in zip(*(each.T for each in boxes.shrunk(share)), strict=True)]
-            found = evaluate_function(self._slopes, [x, t], exact, apply_to_intervals)
-            parts.append(
-                [_stack_balls(values, len(middle), shape) for values, shape in zip(found, shapes, strict=True)]
-            )
-        return _LinearLanes(*(mean_of_balls(each) for each in zip(*parts, strict=True)))
+            spread = up(share * reach)
+            x = [Intervals(*bounds) for bounds in zip(down(middle - spread).T, up(middle + spread).T, strict=True)]
+            t = [_interval(*bounds) for bounds in zip(*(bound.T for bound in boxes.shrunk(share)), strict=True)]
+            slopes = evaluate_intervals(self._slopes, [x, t])
+            parts.append([_stack_balls(of, len(middle), shape) for of, shape in zip(slopes, shapes, strict=True)])
+        return _LinearLanes(*(mean_of_balls(balls) for balls in zip(*parts, strict=True)))
 
 
 class _LinearLanes:
@@ -232,35 +226,35 @@ class _LinearLanes:
         self.inverse, is_singular = invert_matrices(F_x.middle)
         self.inverse[is_singular] = np.nan
         unit = np.eye(F_x.middle.shape[1])
-        near = F_x.times(self.inverse)
-        self.rest = Balls(near.middle - unit, near.radius + 2.0**-52).size
+        near_unit = F_x.times(self.inverse)
+        self.rest = Balls(near_unit.middle - unit, near_unit.radius + 2.0**-52).size
         "|1 - Y F_x|"
-        self.by = F_t.times(-self.inverse)
+        self.by_columns = F_t.times(-self.inverse)
         self.r_x, self.r_t = r_x, r_t
 
-    def image(self, left: Balls, half: Array, reach: Array) -> Array:
+    def image(self, residual: Balls, half_widths: Array, reach: Array) -> Array:
         """How far K goes from the middle (lanes, unknowns)."""
-        step = left.times(self.inverse).size[:, :, 0]
-        moved = (self.by.size @ half[:, :, None])[:, :, 0]
-        turned = (self.rest @ reach[:, :, None])[:, :, 0]
-        return (step + moved + turned) * OVER + TINY
+        from_middle = residual.times(self.inverse).size[:, :, 0]
+        from_columns = (self.by_columns.size @ half_widths[:, :, None])[:, :, 0]
+        from_rest = (self.rest @ reach[:, :, None])[:, :, 0]
+        return (from_middle + from_columns + from_rest) * OVER + TINY
 
     def slopes(self) -> tuple[BoolArray, Balls]:
         """Whether F_x is regular, by some v > 0 with |1 - Y F_x| v < v (A. Neumaier, sec. 4.1), and slopes of results.
 
         A size X of S with |B| + |1 - Y F_x| X <= X holds it, for B = -Y F_t.
         """
-        many, count = self.rest.shape[:2]
-        whole = np.concatenate([np.ones((many, count, 1)), self.by.size], axis=2)
-        known: BoolArray = np.asarray(np.isfinite(self.rest).all(axis=(1, 2)))
-        inverse, is_singular = invert_matrices(np.eye(count) - np.where(known[:, None, None], self.rest, 0.0))
-        wider = whole + SLACK * whole.max(axis=1, keepdims=True, initial=0.0) + LEAST_REACH
+        lanes, count = self.rest.shape[:2]
+        sides = np.concatenate([np.ones((lanes, count, 1)), self.by_columns.size], axis=2)
+        is_finite: BoolArray = np.asarray(np.isfinite(self.rest).all(axis=(1, 2)))
+        inverse, is_singular = invert_matrices(np.eye(count) - np.where(is_finite[:, None, None], self.rest, 0.0))
+        wider = sides + SLACK * sides.max(axis=1, keepdims=True, initial=0.0) + LEAST_REACH
         size = inverse @ wider * (1.0 + SLACK)
-        image = (self.rest @ size + whole) * OVER + TINY
+        image = (self.rest @ size + sides) * OVER + TINY
         holds: BoolArray = np.all((size > 0.0) & (image <= size), axis=(1, 2))
-        far = (self.rest @ size[:, :, 1:]) * OVER + TINY
-        unknown = Balls(self.by.middle, (self.by.radius + far) * OVER)
-        return known & ~is_singular & holds, self.r_x.product(unknown).plus(self.r_t)
+        spread = (self.rest @ size[:, :, 1:]) * OVER + TINY
+        unknown_slopes = Balls(self.by_columns.middle, (self.by_columns.radius + spread) * OVER)
+        return is_finite & ~is_singular & holds, self.r_x.product(unknown_slopes).plus(self.r_t)
 
 
 def _interval(lower: Array, upper: Array) -> Intervals:
@@ -272,8 +266,8 @@ def _interval(lower: Array, upper: Array) -> Intervals:
 
 def _stack_balls(values: Sequence[Intervals], lanes: int, shape: tuple[int, int]) -> Balls:
     """Dense results, column by column, as balls (lanes, rows, columns)."""
-    both = [np.empty((shape[1], shape[0], lanes)) for _ in range(2)]
-    for k, each in enumerate(values):
-        place = divmod(k, shape[0])
-        both[0][place], both[1][place] = each.lower, each.upper
-    return to_balls(*(each.transpose(2, 1, 0) for each in both))
+    bounds: Array = np.empty((2, shape[1], shape[0], lanes))
+    for k, value in enumerate(values):
+        column, row = divmod(k, shape[0])
+        bounds[0, column, row], bounds[1, column, row] = value.lower, value.upper
+    return to_balls(*bounds.transpose(0, 3, 2, 1))

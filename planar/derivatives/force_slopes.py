@@ -18,12 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import highest_slopes, take_entries, variable_jet
 from planar.derivatives.kinematic_slopes import (
     CoordinateMotion,
     KinematicSlopes,
     NamedResult,
     element_arguments,
+    slopes_of_order,
+    take_entries,
+    variable_jet,
 )
 from planar.dynamics.external_actions import (
     LinkAction,
@@ -70,11 +72,6 @@ class ForceConstants:
     senses: Array
     leading: Array
 
-    def column(self, name: str, index: int, order: int) -> Array:
-        """One of them (n, 1), or (n, 1, 1) beside jets of the second order."""
-        column: Array = getattr(self, name)[:, index]
-        return column.reshape(-1, *((1,) * order))
-
 
 class _Contact(NamedTuple):
     """A contact at positions of any arithmetic, with its pair's index among those that rub, and the places of its parts
@@ -113,7 +110,9 @@ class BalanceAtPositions:
         return exerted
 
     def _constant(self, name: str, index: int) -> Array:
-        return self.of.constants.column(name, index, self.order)
+        """One of `ForceConstants` (n, 1), or (n, 1, 1) beside jets of the second order."""
+        column: Array = getattr(self.of.constants, name)[:, index]
+        return column.reshape(-1, *((1,) * self.order))
 
     @cached_property
     def contacts(self) -> dict[str, ToothContact]:
@@ -198,17 +197,14 @@ class BalanceAtPositions:
         """What an input supplies (N, N m)."""
         return take_entries(self.y, self.of.elements.constraint_count + index)
 
-    def open_balance(self, paths: Sequence[tuple[int, ...]], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
-        """By how much the balance is open (n, coordinates and contacts, ...): of jets the parts that paths lead to, in
-        these shapes."""
+    def open_balance(self, orders: Sequence[int], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+        """By how much the balance is open (n, coordinates and contacts, ...): values, for an order of 0, or the
+        derivatives of an order, in these shapes."""
         totals: list[Array] = [np.zeros(shape) for shape in shapes]
 
         def add(column: int, value: Scalar) -> None:
-            for total, path in zip(totals, paths, strict=True):
-                part = value
-                for step in path:
-                    part = part.parts[step] if isinstance(part, Jet) else (part if step == 0 else 0.0)
-                total[:, column] += part
+            for total, order in zip(totals, orders, strict=True):
+                total[:, column] += slopes_of_order(value, order)
 
         for group, names in self.of.groups:
             exerted, _ = self._constraint_forces[names[0]]
@@ -253,37 +249,45 @@ class BalanceAtPositions:
         return parts
 
     def _load(self, pair: Pair, load: ContactLoad) -> Scalar:
-        """A part of what a pair's constraints exert on a link; the frame has what the other bodies have not."""
-        forces = self.constraint_forces(pair.name, apart=False)
-        if load.link in forces:
-            return self._load_on(load.link, forces[load.link], load)
-        others = (self._load_on(link, parts, load) for link, parts in forces.items())
-        return -sum(others, 0.0)
-
-    def _load_on(self, link: str, parts: list[Scalar], load: ContactLoad) -> Scalar:
-        force, frame = Vector(parts[0], parts[1]), self.motion.frame(link)
+        """A part of what a pair's constraints exert on a link."""
+        force, moment = self._wrench(self.constraint_forces(pair.name, apart=False), load.link)
         if load.direction is not None:
             return load.direction.dot(force)
         assert load.place is not None
-        return parts[2] - (load.place - Vector(frame.x, frame.y)).cross(force)
+        return moment - load.place.cross(force)
+
+    def _wrench(self, forces: LinkForces, link: str) -> tuple[Vector, Scalar]:
+        """What a pair exerts on a link by its forces on moving links: the force, and the moment about the world's
+        origin; on the frame acts what adds up to nothing."""
+        wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
+        for body, (x, y, moment) in forces.items():
+            frame = self.motion.frame(body)
+            wrenches[body] = x, y, moment + (frame.x * y - frame.y * x)
+        if link in wrenches:
+            x, y, moment = wrenches[link]
+        else:
+            x, y, moment = (-sum((wrench[k] for wrench in wrenches.values()), 0.0) for k in range(3))
+        return Vector(x, y), moment
 
     # results
 
-    def results(self, name: str, input_rates: Sequence[Scalar]) -> list[NamedResult]:
+    def results(self, name: str) -> list[NamedResult]:
         """The results of forces of a name: the effort of an input with its power, the force and couple of a pair,
-        friction; `input_rates` are the velocities of the inputs."""
+        friction."""
         results = []
         motions = self.motion.relative_motions
         slides = name in motions and motions[name].input_kind is MeasureKind.LENGTH
         effort_kind = "force" if slides else "torque"
         if name in self.of.inputs:
-            index = self.of.inputs.index(name)
-            effort = self.effort(index)
+            effort = self.effort(self.of.inputs.index(name))
+            velocity = self.motion.input_position(motions[name]).parts[1]
             results.append(NamedResult("effort", effort_kind, (effort,)))
-            results.append(NamedResult("power", "power", (input_rates[index] * effort,)))
+            results.append(NamedResult("power", "power", (velocity * effort,)))
         if name in self.pairs:
-            x, y, couple = self._reaction(name)
-            results.append(NamedResult("force", "force", (x, y)))
+            force, moment = self._wrench(self.pair_forces(name), self.pairs[name].links[1])
+            place = self._reaction_point(self.pairs[name])
+            couple = moment if place is None else moment - place.cross(force)
+            results.append(NamedResult("force", "force", tuple(force)))
             results.append(NamedResult("couple", "torque", (couple,)))
         for index, contact in enumerate(self.rubbing_contacts):
             if contact.pair.name == name:
@@ -291,22 +295,8 @@ class BalanceAtPositions:
                 break
         return results
 
-    def _reaction(self, name: str) -> tuple[Scalar, Scalar, Scalar]:
-        """The force (x, y) of a pair on its second link, and its couple about the point of that force."""
-        pair, forces = self.pairs[name], self.pair_forces(name)
-        wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
-        for link, (x, y, moment) in forces.items():
-            frame = self.motion.frame(link)
-            wrenches[link] = x, y, moment + (frame.x * y - frame.y * x)
-        second = pair.links[1]
-        if second not in wrenches:  # on the frame acts what adds up to nothing
-            x, y, moment = (-sum((wrench[k] for wrench in wrenches.values()), 0.0) for k in range(3))
-        else:
-            x, y, moment = wrenches[second]
-        place = self._reaction_point(pair)
-        return (x, y, moment) if place is None else (x, y, moment - place.x * y + place.y * x)
-
     def _reaction_point(self, pair: Pair) -> Vector | None:
+        """Where the force of a pair is told."""
         if pair.name in self.contacts:
             return self.contacts[pair.name].pitch_point
         end = bearing_point(pair)
@@ -335,6 +325,7 @@ class ForceSlopes:
         self.inputs, self.rubs = parameters.inputs, forces is not None and bool(forces.friction)
         self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
         self.factors = factors
+        self._balances: dict[int, BalanceAtPositions] = {}
         constants = [rates[..., None] for rates in kinematics.rates]
         self.motion = CoordinateMotion(self.elements, kinematics.numbers(0), parameters.unit, Jet(*constants))
         count = len(factors)
@@ -358,7 +349,8 @@ class ForceSlopes:
             self.y = self._solve_with_friction(forces, rows, contacts)
         else:
             for _ in range(2 if self.toothed else 1):  # first which way teeth press
-                self.y = self._solve_linear()
+                opening, slopes = self._linearise(np.zeros((count, self.unknown_count)))
+                self.y = _close_balance(slopes, invert_matrices(slopes)[0], opening)[..., 0]
                 self.constants.pressing = np.sign(self.y[:, self._pressing_rows])
 
     @property
@@ -376,25 +368,26 @@ class ForceSlopes:
         balance = BalanceAtPositions(self, self.motion, variable_jet(y, unit), list(self.factors.T[..., None]))
         rows = self.elements.coordinate_count + count - self.first_friction
         with np.errstate(all="ignore"):  # what is not defined is not a number
-            opening, slopes = balance.open_balance([(0,), (1,)], [(len(y), rows, 1), (len(y), rows, count)])
+            opening, slopes = balance.open_balance([0, 1], [(len(y), rows, 1), (len(y), rows, count)])
         return opening, slopes
-
-    def _solve_linear(self) -> Array:
-        opening, slopes = self._linearise(np.zeros((len(self.factors), self.unknown_count)))
-        return _close_balance(slopes, invert_matrices(slopes)[0], opening)[..., 0]
 
     def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
         """The forces with friction, by Newton's method from the friction of the solution, on its side of all kinks."""
-        count, own = len(self.factors), self.first_friction
+        count, first_friction = len(self.factors), self.first_friction
         names = list(dict.fromkeys(contact.pair.name for contact in contacts))
-        senses = self._column_per_pair([forces.friction[name].sense for name in names], rows_of_all)
+
+        def columns(values: Sequence[Array | float]) -> Array:
+            """Values at all positions, or alike at all, as columns (n, values) at these."""
+            rows = [value if np.ndim(value) == 0 else np.asarray(value)[rows_of_all] for value in values]
+            return np.stack([np.broadcast_to(row, (count,)) for row in rows], axis=1)
+
+        senses = columns([forces.friction[name].sense for name in names])
         first_of_pair = np.array(
             [k == 0 or contacts[k - 1].pair_index != contact.pair_index for k, contact in enumerate(contacts)]
         )
         acts = first_of_pair & (senses[:, [contact.pair_index for contact in contacts]] != 0.0)
-        efforts = [np.abs(forces.friction[contact.pair.name].effort) for contact in contacts]
-        known = self._column_per_pair(efforts, rows_of_all)
-        y: Array = np.concatenate([np.zeros((count, own)), np.nan_to_num(known) * acts], axis=1)
+        known = columns([np.abs(forces.friction[contact.pair.name].effort) for contact in contacts])
+        y: Array = np.concatenate([np.zeros((count, first_friction)), np.nan_to_num(known) * acts], axis=1)
         self.constants.senses = senses.astype(float)
         self.constants.leading = np.zeros((count, contacts[-1].parts.stop))
         is_tie: BoolArray = np.zeros(count, bool)
@@ -402,23 +395,16 @@ class ForceSlopes:
             opening, slopes = self._linearise(y)
             is_fixed = step < FIXED_FRICTION_STEPS
             rows = slice(0, -len(contacts)) if is_fixed else slice(None)
-            free = slice(0, own) if is_fixed else slice(None)
+            free = slice(0, first_friction) if is_fixed else slice(None)
             inverse, _ = invert_matrices(np.nan_to_num(slopes[:, rows, free]))
             change = (inverse @ np.nan_to_num(opening[:, rows]))[..., 0]
             y[:, free] -= change
             self.constants.pressing = np.sign(y[:, self._pressing_rows])
             is_tie = self._choose_greatest(y)
-        size, moved = np.abs(y).max(axis=1), np.abs(change).max(axis=1)
-        off = (np.abs(y[:, own:] - known) * acts).max(axis=1, initial=0.0)
-        self.is_unknown = is_tie | ~(moved <= SETTLED * size) | ~(off <= SETTLED * size)
+        tolerance, last_change = SETTLED * np.abs(y).max(axis=1), np.abs(change).max(axis=1)
+        deviation = (np.abs(y[:, first_friction:] - known) * acts).max(axis=1, initial=0.0)
+        self.is_unknown = is_tie | ~(last_change <= tolerance) | ~(deviation <= tolerance)
         return y
-
-    def _column_per_pair(self, values: Sequence[Array | float], rows_of_all: slice) -> Array:
-        """Values at all positions, or alike at all, as columns (n, values) at these."""
-        columns: Array = np.empty((len(self.factors), len(values)))
-        for k, value in enumerate(values):
-            columns[:, k] = value if np.ndim(value) == 0 else np.asarray(value)[rows_of_all]
-        return columns
 
     def _choose_greatest(self, y: Array) -> BoolArray:
         """Choose which part each contact follows; where two are the greatest (n,)."""
@@ -441,36 +427,26 @@ class ForceSlopes:
         _, slopes = self._linearise(self.y)
         return slopes, invert_matrices(slopes)[0]
 
-    @cached_property
-    def first_balance(self) -> BalanceAtPositions:
-        """The balance with the first derivatives of all forces."""
-        return self._derive(1)
-
-    @cached_property
-    def second_balance(self) -> BalanceAtPositions:
-        """The balance with their second derivatives."""
-        return self._derive(2)
-
     def balance(self, order: int) -> BalanceAtPositions:
         """The balance with the derivatives of all forces of an order, to be asked for results."""
-        return self.first_balance if order == 1 else self.second_balance
+        if order not in self._balances:
+            self._balances[order] = self._derive(order)
+        return self._balances[order]
 
     def _derive(self, order: int) -> BalanceAtPositions:
         motion = self.kinematics.motion if order == 1 else self.kinematics.second_motion
         slopes, inverse = self._closing_matrices
-        lanes = [self.kinematics.count] * order
+        shape = [self.kinematics.count] * order
+        lower = [] if order == 1 else [slopes_of_order(self.balance(1).y, 1)]
 
         def balance_with(derivatives: Array) -> BalanceAtPositions:
             """The balance with these derivatives of the highest order (n, unknowns, parameters, ...)."""
-            if order == 1:
-                y = variable_jet(self.y, derivatives)
-            else:
-                y = variable_jet(self.y, highest_slopes(self.first_balance.y, 1), derivatives)
+            y = variable_jet(self.y, *lower, derivatives)
             return BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
 
-        none: Array = np.zeros((len(self.y), self.unknown_count, *lanes))
+        none: Array = np.zeros((len(self.y), self.unknown_count, *shape))
         with np.errstate(all="ignore"):  # what is not defined is not a number
-            (opening,) = balance_with(none).open_balance([(1,) * order], [(len(self.y), slopes.shape[1], *lanes)])
+            (opening,) = balance_with(none).open_balance([order], [(len(self.y), slopes.shape[1], *shape)])
         columns = opening.reshape(*opening.shape[:2], self.kinematics.count**order)
         return balance_with(_close_balance(slopes, inverse, columns).reshape(none.shape))
 

@@ -9,13 +9,14 @@ Analysis, SIAM 2009, ch. 2 and 5). Where nothing finite is known, bounds are NaN
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from math import factorial
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from planar.equations.generic_evaluation import OPERATIONS
+from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
 from planar.foundation.arrays import Array, BoolArray
 
 HALF_PI_PARTS = (1.5707963267341256, 6.077100506506192e-11)
@@ -70,15 +71,15 @@ class Intervals:
 
     def inverse(self) -> Intervals:
         """1 / x; NaN where 0 is within."""
-        without = (self.lower > 0.0) | (self.upper < 0.0)
-        low, high = np.where(without, self.upper, np.nan), np.where(without, self.lower, np.nan)
+        is_known = (self.lower > 0.0) | (self.upper < 0.0)
+        low, high = np.where(is_known, self.upper, np.nan), np.where(is_known, self.lower, np.nan)
         return Intervals(down(1.0 / low), up(1.0 / high))
 
     def __truediv__(self, other: Intervals) -> Intervals:
-        without = (other.lower > 0.0) | (other.upper < 0.0)
-        low, high = np.where(without, other.lower, np.nan), np.where(without, other.upper, np.nan)
-        found = [self.lower / low, self.lower / high, self.upper / low, self.upper / high]
-        return Intervals(down(np.minimum.reduce(found)), up(np.maximum.reduce(found)))
+        is_known = (other.lower > 0.0) | (other.upper < 0.0)
+        low, high = np.where(is_known, other.lower, np.nan), np.where(is_known, other.upper, np.nan)
+        quotients = [self.lower / low, self.lower / high, self.upper / low, self.upper / high]
+        return Intervals(down(np.minimum.reduce(quotients)), up(np.maximum.reduce(quotients)))
 
     def twice(self) -> Intervals:
         """2 x."""
@@ -117,11 +118,11 @@ class Intervals:
     def atan2(self, other: Intervals) -> Intervals:
         """The angle at x = other, y = self; NaN where the half line to the left, or the origin, is within."""
         y, x = self, other
-        known = (x.lower > 0.0) | (y.lower > 0.0) | (y.upper < 0.0)
-        ways = [_point_angle(end, side) for end in (y.lower, y.upper) for side in (x.lower, x.upper)]
-        low = np.minimum.reduce([each.lower for each in ways])
-        high = np.maximum.reduce([each.upper for each in ways])
-        return Intervals(np.where(known, low, np.nan), np.where(known, high, np.nan))
+        is_known = (x.lower > 0.0) | (y.lower > 0.0) | (y.upper < 0.0)
+        corners = [_point_angle(*corner) for corner in product((y.lower, y.upper), (x.lower, x.upper))]
+        low = np.minimum.reduce([corner.lower for corner in corners])
+        high = np.maximum.reduce([corner.upper for corner in corners])
+        return Intervals(np.where(is_known, low, np.nan), np.where(is_known, high, np.nan))
 
 
 def exact(value: Any) -> Intervals:
@@ -169,11 +170,10 @@ def _may_hold(angle: Intervals, on: float) -> BoolArray:
 def _point_angle(y: Array, x: Array) -> Intervals:
     """The angle of points, by what turning them back by a float near it leaves: |atan t| <= |t|."""
     near = np.arctan2(y, x)
-    at = exact(near)
-    cos, sin = at.cos(), at.sin()
+    cos, sin = exact(near).cos(), exact(near).sin()
     across, along = exact(y) * cos - exact(x) * sin, exact(x) * cos + exact(y) * sin
-    left = (across / along).magnitude().upper
-    return Intervals(down(near - left), up(near + left))
+    error = (across / along).magnitude().upper
+    return Intervals(down(near - error), up(near + error))
 
 
 INTERVAL_OPERATIONS: Mapping[int, Callable[..., Intervals]] = {
@@ -189,9 +189,10 @@ INTERVAL_OPERATIONS: Mapping[int, Callable[..., Intervals]] = {
 }
 
 
-def apply_to_intervals(code: int, operands: Sequence[Intervals]) -> Intervals:
-    """What an operation of casadi makes of intervals. Raises KeyError for one that is not of `INTERVAL_OPERATIONS`."""
-    return INTERVAL_OPERATIONS[code](*operands)
+def evaluate_intervals(function: ca.Function, inputs: Sequence[Sequence[Intervals]]) -> list[list[Intervals]]:
+    """The results of a casadi function of intervals, dense, column by column. Raises KeyError for an operation that is
+    not of `INTERVAL_OPERATIONS`."""
+    return evaluate_function(function, inputs, exact, lambda code, operands: INTERVAL_OPERATIONS[code](*operands))
 
 
 class Balls(NamedTuple):
@@ -205,17 +206,19 @@ class Balls(NamedTuple):
         """The greatest that entries may be."""
         return (np.abs(self.middle) + self.radius) * OVER
 
-    def times(self, left: Array) -> Balls:
-        """left @ self, of matrices of floats; a sum of n products in any order is off by n roundings at most."""
-        many = (left.shape[-1] + 2) * UNIT_ROUNDOFF
-        lost = np.abs(left) @ (self.radius + many * np.abs(self.middle))
-        return Balls(left @ self.middle, lost * OVER + TINY)
+    def rows(self, which: Any) -> Balls:
+        """Those of some lanes."""
+        return Balls(self.middle[which], self.radius[which])
+
+    def times(self, factor: Array) -> Balls:
+        """factor @ self, of matrices of floats; a sum of n products in any order is off by n roundings at most."""
+        return Balls(factor, np.zeros_like(factor)).product(self)
 
     def product(self, other: Balls) -> Balls:
         """self @ other."""
-        many = (other.middle.shape[-2] + 2) * UNIT_ROUNDOFF
-        far = np.abs(self.middle) @ (other.radius + many * np.abs(other.middle)) + self.radius @ other.size
-        return Balls(self.middle @ other.middle, far * OVER + TINY)
+        rounding = (other.middle.shape[-2] + 2) * UNIT_ROUNDOFF
+        radius = np.abs(self.middle) @ (other.radius + rounding * np.abs(other.middle)) + self.radius @ other.size
+        return Balls(self.middle @ other.middle, radius * OVER + TINY)
 
     def plus(self, other: Balls) -> Balls:
         """self + other."""
@@ -227,9 +230,9 @@ def mean_of_balls(parts: Sequence[Balls]) -> Balls:
     """The mean of some."""
     if len(parts) == 1:
         return parts[0]
-    middle = np.sum([each.middle for each in parts], axis=0) / len(parts)
-    size = np.sum([np.abs(each.middle) for each in parts], axis=0) / len(parts)
-    radius = np.sum([each.radius for each in parts], axis=0) / len(parts)
+    middle = np.mean([part.middle for part in parts], axis=0)
+    size = np.mean([np.abs(part.middle) for part in parts], axis=0)
+    radius = np.mean([part.radius for part in parts], axis=0)
     return Balls(middle, (radius + (len(parts) + 1) * 2.0 * UNIT_ROUNDOFF * size) * OVER + TINY)
 
 

@@ -5,24 +5,20 @@ second rates for every value of the parameters. Evaluated on jets along the para
 order of rates are still zero, each of them leaves open what J dq has to close, with the one matrix J = dF/dq for
 positions, velocities and accelerations (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 13 and 15).
 Second derivatives follow in the same way from jets of the second order.
+
+A jet along the parameters is Jet(value, slopes), whose slopes have a last axis for the parameters; one of the second
+order is a jet of such jets, with two axes. Time derivatives are jets around these.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.derivatives.directional_jets import (
-    highest_slopes,
-    parameter_jet,
-    plain_value,
-    stack_numbers,
-    take_entries,
-    variable_jet,
-)
 from planar.derivatives.parameters import Parameters
 from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
@@ -33,12 +29,10 @@ from planar.equations.elements import PlacedElement
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import Unknown, suggest_name
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, Scalar, constant_jet, cos, sin
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-from planar.results.kinematic_result import KinematicResult
 
 TINY = 1e-300
 ROUNDING = 1e-15
@@ -56,7 +50,7 @@ class ConstraintElements(LinkCoordinates):
     def __init__(self, mechanism: Mechanism):
         super().__init__(mechanism)
         motions = relative_motions(mechanism)
-        inputs = [motions[given.pair] for given in mechanism.inputs]
+        inputs = [motions[driven.pair] for driven in mechanism.inputs]
         numbered = {pair.name: pair for pair in (*mechanism.pairs, *inputs)}
         self.numbered_pairs = tuple(numbered)
         "the names of the pairs whose numbers are p, one after the other"
@@ -80,9 +74,7 @@ class ConstraintElements(LinkCoordinates):
         "of every group the entries there (places, rows, local coordinates)"
 
 
-@lru_cache(maxsize=32)
-def _cached_elements(structure: Mechanism) -> ConstraintElements:
-    return ConstraintElements(structure)
+_cached_elements = lru_cache(maxsize=32)(ConstraintElements)
 
 
 def constraint_elements(mechanism: Mechanism) -> ConstraintElements:
@@ -102,6 +94,49 @@ def element_arguments(group: ElementGroup, q: Scalar, p: Scalar, orders: int) ->
     return [*arguments, *(constant_jet(number, orders) if orders else number for number in numbers)]
 
 
+def variable_jet(value: Array, *derivatives: Array) -> Scalar:
+    """What depends on the parameters: values (n, entries), slopes (n, entries, parameters), and second ones; values
+    alone have one axis for none."""
+    if not derivatives:
+        return value[..., None]
+    if len(derivatives) == 1:
+        return Jet(value[..., None], derivatives[0])
+    slopes, second_slopes = derivatives
+    return Jet(Jet(value[..., None, None], slopes[..., None, :]), Jet(slopes[..., None], second_slopes))
+
+
+def take_entries(value: Scalar, entries: Any) -> Scalar:
+    """Some entries of arrays (n, entries, ...) in a jet, or of a jet of jets."""
+    if isinstance(value, Jet):
+        return Jet(*(take_entries(part, entries) for part in value.parts))
+    return value[:, entries]
+
+
+def slopes_of_order(value: Scalar, order: int) -> Scalar:
+    """The derivatives of an order, of a number that may have none: 0; of order 0 the number itself."""
+    if order:
+        for _ in range(order):
+            value = value.parts[1] if isinstance(value, Jet) else 0.0
+        return value
+    while isinstance(value, Jet):
+        value = value.parts[0]
+    return value
+
+
+def stack_numbers(numbers: Sequence[Scalar], count: int, order: int) -> Scalar:
+    """Numbers as one jet of arrays (1 or n, numbers, ...), of `count` parameters; of order 0 an array (1 or n, numbers,
+    1)."""
+    size = max((np.size(slopes_of_order(number, 0)) for number in numbers), default=1)
+    arrays: list[Array] = [np.zeros((size, len(numbers), *((count,) * axes))) for axes in range(order + 1)]
+    for k, number in enumerate(numbers):
+        arrays[0][:, k] = np.ravel(slopes_of_order(number, 0))
+        for axes in range(1, order + 1) if isinstance(number, Jet) else ():
+            inner = number if axes == order else number.parts[0]
+            shape = size, *((1,) * (order - axes)), *((count,) * axes)
+            arrays[axes][:, k] = np.broadcast_to(slopes_of_order(inner, axes), shape).reshape(arrays[axes][:, k].shape)
+    return variable_jet(*arrays)
+
+
 class Directions:
     """The parameters along which there are derivatives: all of them, or those of some `columns` among their names, and
     `extra` ones behind them on which no coordinates depend."""
@@ -114,7 +149,11 @@ class Directions:
     def jet(self, column: int, value: Scalar, order: int) -> Scalar:
         """The parameter of a column, of an order; one that is not chosen is a number."""
         place = self.places.get(column)
-        return value if place is None or order == 0 else parameter_jet(value, place, self.count, order)
+        if place is None or order == 0:
+            return value
+        unit: Array = np.zeros(self.count)
+        unit[place] = 1.0
+        return Jet(value, unit) if order == 1 else Jet(Jet(value, unit), Jet(unit[:, None], 0.0))
 
 
 class FileNumbers:
@@ -153,12 +192,23 @@ class FileNumbers:
         self.p = stack_numbers(of_pairs, directions.count, order)
 
 
-class CoordinateMotion(LinkMotion):
+class RatedMotion(LinkMotion):
+    """Positions of links and of relative motions with rates, in any arithmetic."""
+
+    orders: int
+    "how many rates are known, the position among them"
+
+    @abstractmethod
+    def input_position(self, pair: Pair) -> Jet:
+        """The position of a relative motion with its rates."""
+
+
+class CoordinateMotion(RatedMotion):
     """Positions of links from their coordinates q, jets in time of arrays (n, coordinates, ...)."""
 
     def __init__(self, elements: ConstraintElements, numbers: FileNumbers, size: float, q: Jet):
         self.elements, self.numbers, self._size, self.q = elements, numbers, size, q
-        self.mechanism, self.shapes = numbers.mechanism, numbers.shapes
+        self.mechanism, self.shapes, self.orders = numbers.mechanism, numbers.shapes, len(q.parts)
         self._frames: dict[str, Frame] = {}
 
     @property
@@ -180,18 +230,16 @@ class CoordinateMotion(LinkMotion):
 
     def own_coordinates(self, name: str) -> tuple[Jet, ...]:
         """The coordinates of a pair's own as jets in time."""
-        own = self.elements.own_slices.get(name)
-        return () if own is None else tuple(take_entries(self.q, k) for k in range(own.start, own.stop))
+        columns = self.elements.own_slices.get(name, slice(0, 0))
+        return tuple(take_entries(self.q, k) for k in range(columns.start, columns.stop))
 
     def input_position(self, pair: Pair) -> Jet:
-        """The position of a relative motion with its rates."""
-        orders = len(self.q.parts)
         frames = [
             self.moving_frame(link) if link in self.elements.link_columns else self.frame(link) for link in pair.bodies
         ]
-        numbers = [constant_jet(number, orders) for number in self.numbers.measured[pair.name]]
+        numbers = [constant_jet(number, self.orders) for number in self.numbers.measured[pair.name]]
         position = pair.input_position(frames, numbers, self.own_coordinates(pair.name))
-        return position if isinstance(position, Jet) else Jet(position, *([0.0] * (orders - 1)))
+        return position if isinstance(position, Jet) else Jet(position, *([0.0] * (self.orders - 1)))
 
 
 class KinematicSlopes:
@@ -216,7 +264,7 @@ class KinematicSlopes:
         unit = parameters.unit
         self._row_scale = np.where(self.elements.is_length_row, 1.0 / unit, 1.0)[:, None]
         self._column_scale = np.where(self.elements.is_length, unit, 1.0)[:, None]
-        scaled = self._scaled_jacobian(plain_value(self.first_numbers.p)[..., 0])
+        scaled = self._scaled_jacobian(slopes_of_order(self.first_numbers.p, 0)[..., 0])
         sizes = scaled.column_norms(TINY)
         self._column_scale = self._column_scale / sizes[..., None]
         self._constraints = Equilibrium(scaled.divide_columns(sizes))
@@ -242,28 +290,23 @@ class KinematicSlopes:
         scale = self._row_scale[pattern.rows, 0] * self._column_scale[pattern.columns, 0]
         return SparseMatrices(pattern, values * scale)
 
-    def coordinates(self, slopes: Sequence[Array], second: Sequence[Array] | None = None) -> Jet:
+    def _coordinates(self, *derivatives: Sequence[Array]) -> Jet:
         """The coordinates as jets in time, as far as their derivatives are given."""
-        return Jet(
-            *(
-                variable_jet(value, slope, None if second is None else second[rate])
-                for rate, (value, slope) in enumerate(zip(self.rates, slopes, strict=False))
-            )
-        )
+        return Jet(*(variable_jet(value, *slopes) for value, *slopes in zip(self.rates, *derivatives, strict=False)))
 
     @cached_property
     def motion(self) -> CoordinateMotion:
         """The positions of links with their first derivatives."""
-        return CoordinateMotion(
-            self.elements, self.first_numbers, self.parameters.unit, self.coordinates(self.first_slopes)
-        )
+        return self._motion(self.first_numbers, self.first_slopes)
 
     @cached_property
     def second_motion(self) -> CoordinateMotion:
         """The positions of links with their second derivatives."""
         numbers = self.numbers(2)
-        q = self.coordinates(self.first_slopes, self._solve(2, numbers))
-        return CoordinateMotion(self.elements, numbers, self.parameters.unit, q)
+        return self._motion(numbers, self.first_slopes, self._solve(2, numbers))
+
+    def _motion(self, numbers: FileNumbers, *derivatives: Sequence[Array]) -> CoordinateMotion:
+        return CoordinateMotion(self.elements, numbers, self.parameters.unit, self._coordinates(*derivatives))
 
     def _solve(self, order: int, numbers: FileNumbers) -> list[Array]:
         """The derivatives of an order of the coordinates and their rates (n, coordinates, parameters, ...)."""
@@ -271,7 +314,7 @@ class KinematicSlopes:
         solved: list[Array] = []
         for rate in range(len(self.rates)):
             tried = [*solved, np.zeros(shape)]
-            q = self.coordinates(tried) if order == 1 else self.coordinates(self.first_slopes[: rate + 1], tried)
+            q = self._coordinates(tried) if order == 1 else self._coordinates(self.first_slopes, tried)
             opening = self._opening(q, numbers.p, rate, order)
             columns = opening.reshape(*opening.shape[:2], self.count**order) * self._row_scale
             constraints = self._constraints
@@ -294,7 +337,7 @@ class KinematicSlopes:
                 rests = group.element.rest.evaluate(element_arguments(group, q, p, rate + 1))
                 for row, rest in enumerate(rests):
                     part = rest.parts[rate] if isinstance(rest, Jet) else 0.0
-                    opening[:, group.rows[:, row]] = highest_slopes(part, order)
+                    opening[:, group.rows[:, row]] = slopes_of_order(part, order)
         if order == 1:  # what inputs prescribe
             for k in range(len(self.parameters.inputs)):
                 place = self.directions.places.get(rate * len(self.parameters.inputs) + k)
@@ -312,9 +355,9 @@ class KinematicSlopes:
             scale[place] = self.parameters.scale[column]
         for pair in self.first_numbers.mechanism.pairs:
             if type(pair).contact_gap is not Pair.contact_gap:
-                own = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
-                gap = pair.contact_gap(self.first_numbers.measured[pair.name], own)
-                opened |= np.abs(highest_slopes(gap, 1) / unit * scale) > OPENING
+                coordinates = [coordinate.parts[0] for coordinate in self.motion.own_coordinates(pair.name)]
+                gap = pair.contact_gap(self.first_numbers.measured[pair.name], coordinates)
+                opened |= np.abs(slopes_of_order(gap, 1) / unit * scale) > OPENING
         tied: BoolArray = self.contradicts | opened
         tied[self.is_singular] = False
         return tied
@@ -334,12 +377,12 @@ POINT_RESULTS = {"position": "length", "velocity": "velocity", "acceleration": "
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
-def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
+def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
     """The results of a state of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
 
     Without rates only what follows from positions.
     """
-    results, orders = [], len(motion.q.parts)
+    results, orders = [], motion.orders
     if name in points:
         link, point = points[name]
         local = motion.shapes[link].position(point)
@@ -361,17 +404,10 @@ def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, 
     return results
 
 
-def unknown_name(moving: KinematicResult, name: str) -> Unknown:
-    """That nothing bears a name."""
-    known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
-    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
-
-
 def result_array(value: Scalar, order: int, shape: Sequence[int]) -> Array:
     """The value (n,) or the derivatives of an order (n, parameters, ...) of a number."""
-    part = highest_slopes(value, order) if order else plain_value(value)
-    array: Array = np.empty(shape)
-    array[:] = part if order else np.reshape(part, (-1,)) if np.ndim(part) else part
+    part, array = slopes_of_order(value, order), np.empty(shape)
+    array[:] = part if order else np.ravel(part)
     return array
 
 

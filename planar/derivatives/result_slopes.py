@@ -1,8 +1,10 @@
-"""The derivatives of results of a state, a motion or forces, at every position, in every parameter."""
+"""The derivatives of results of a state, a motion or forces, at every position, in every parameter; and what a
+mechanism with other dimensions shows at given positions of its inputs, with the derivatives in both."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,26 +13,28 @@ import numpy as np
 from planar.derivatives.force_slopes import ForceSlopes, factor_slopes, slopes_by_factors
 from planar.derivatives.kinematic_slopes import (
     POSITION_KINDS,
+    CoordinateMotion,
     Directions,
     KinematicSlopes,
     NamedResult,
     constraint_elements,
     kinematic_results,
     stack_results,
-    unknown_name,
 )
 from planar.derivatives.parameters import Parameters, design_dimensions
-from planar.document.dimensions import Dimension
+from planar.document.dimensions import Dimension, value_at
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import load_factors
 from planar.foundation.arrays import Array, BoolArray
-from planar.foundation.errors import BadInput
-from planar.foundation.jets import Scalar
+from planar.foundation.errors import BadInput, NoAnswer, Unknown, suggest_name
+from planar.foundation.jets import sqrt
 from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
+from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
-from planar.solving.position import solved_mechanism
+from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.position import solve, solved_mechanism
 
 MAX_CHUNK_NUMBERS = 2_000_000
 """Derivatives of coordinates that are held at once."""
@@ -76,19 +80,10 @@ class PositionSlopes:
         motion = kinematics.motion if order == 1 else kinematics.second_motion
         results = kinematic_results(motion, system.moving._point_members, name)
         if self.forces is not None:
-            results += self.forces.balance(order).results(name, self._input_velocities(order))
+            results += self.forces.balance(order).results(name)
         if not results:
             raise unknown_name(system.moving, name)
         return results
-
-    def _input_velocities(self, order: int) -> list[Scalar]:
-        inputs = self.system.parameters.inputs
-        velocities = [np.broadcast_to(self.system.moving.inputs[name].velocity, self.system.count) for name in inputs]
-        directions = self.system.directions
-        return [
-            directions.jet(len(inputs) + k, velocity[self.rows].reshape(-1, *((1,) * order)), order)
-            for k, velocity in enumerate(velocities)
-        ]
 
 
 class SlopeSystem:
@@ -104,15 +99,19 @@ class SlopeSystem:
         numbers: Sequence[str] | None = None,
     ):
         """`is_balanced`: forces without friction and inertia are derived, of a state or a motion too; `has_rates` is
-        false where results of positions alone are asked for, `numbers` are the parameters, by default all."""
+        false where results of positions alone are asked for, `numbers` are the parameters, by default all. Raises
+        BadInput of forces that equilibrium does not determine."""
         self.moving: State | Motion = result.moving if isinstance(result, Forces) else result
         self.forces = result if isinstance(result, Forces) else None
         self.is_balanced = is_balanced or self.forces is not None
         mechanism = self.moving.mechanism
         self.parameters = Parameters(mechanism, offsets)
         self.names = self.parameters.names if numbers is None else tuple(numbers)
-        if self.forces is not None:
-            refuse_stiffness(self.forces)
+        if self.forces is not None and mechanism.pair_stiffness:
+            raise BadInput(
+                mechanism.pair_stiffness[0][0],
+                "derivatives are told of forces that equilibrium determines, and not of those shared by stiffness",
+            )
         columns = [self.parameters.names.index(name) for name in self.names]
         self.directions = Directions(self.parameters, columns, len(mechanism.loads) if self.is_balanced else 0)
         elements = constraint_elements(mechanism)
@@ -157,7 +156,10 @@ class SlopeSystem:
                 slopes.setdefault(result.name, []).append(stack_results(result.parts, 1, shape))
         # results side by side, so that rounding at a kink of a load's course is judged beside all of them
         ends = np.cumsum([arrays[0].shape[1] for arrays in slopes.values()])[:-1]
-        joined = self._with_factors(np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1))
+        joined = np.concatenate([np.concatenate(arrays) for arrays in slopes.values()], axis=1)
+        if self.is_balanced:  # with what the factors of loads change by the parameters
+            parameters, factors = np.split(joined, [len(self.names)], axis=2)
+            joined = parameters + slopes_by_factors(factors, factor_slopes(self.moving, self.names))
         is_singular = np.concatenate(singular_rows)
         joined[is_singular] = np.nan
         return DerivedResults(
@@ -180,14 +182,6 @@ class SlopeSystem:
         slopes = {result: np.where(is_free, array, np.nan) for result, array in derived.slopes.items()}
         return derived._replace(slopes=slopes, tied=tuple(number for number in self.names if number in bound))
 
-    def _with_factors(self, slopes: Array) -> Array:
-        """The derivatives by the parameters alone, with what the factors of loads change by them."""
-        if not self.is_balanced:
-            return slopes
-        count = len(self.names)
-        by_inputs = factor_slopes(self.moving, self.names)
-        return slopes[..., :count] + slopes_by_factors(slopes[..., count:], by_inputs)
-
     def second_slopes(self, name: str, result: str) -> Array:
         """The second derivatives of a result (n, parts, parameters, parameters)."""
         count = len(self.names)
@@ -197,6 +191,12 @@ class SlopeSystem:
             shape = part.count, self.directions.count, self.directions.count
             rows.append(stack_results(values, 2, shape)[:, :, :count, :count])
         return np.concatenate(rows)
+
+
+def unknown_name(moving: KinematicResult, name: str) -> Unknown:
+    """That nothing bears a name."""
+    known = dict.fromkeys((*moving.point_names, *moving.frames, *moving._relative_motions))
+    return Unknown(f"there is no point, link or pair {name!r}{suggest_name(name, known, 'names')}")
 
 
 def second_derivatives(
@@ -210,15 +210,6 @@ def second_derivatives(
     """Those of a result of this kind of quantity, see `SlopeSystem`; without rates where positions determine it."""
     has_rates = isinstance(source, Forces) or kind not in POSITION_KINDS
     return SlopeSystem(source, offsets, has_rates=has_rates, numbers=numbers).second_slopes(of, result)
-
-
-def refuse_stiffness(forces: Forces) -> None:
-    """Refuse forces whose derivatives do not follow from equilibrium alone. Raises BadInput."""
-    if forces.mechanism.pair_stiffness:
-        raise BadInput(
-            forces.mechanism.pair_stiffness[0][0],
-            "derivatives are told of forces that equilibrium determines, and not of those shared by stiffness",
-        )
 
 
 def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -> tuple[str, ...]:
@@ -264,3 +255,76 @@ def _is_accepted(mechanism: Mechanism, dimensions: Sequence[Dimension], sign: fl
     except BadInput:
         return False
     return True
+
+
+class PredictedValues(NamedTuple):
+    """Results (n, parts), their derivatives in inputs (n, parts, inputs) and numbers (n, parts, numbers), SI, and where
+    there are none of these (n,)."""
+
+    values: Array
+    by_inputs: Array
+    by_numbers: Array
+    is_singular: BoolArray
+
+
+def position_results(moving: KinematicResult, name: str) -> dict[str, NamedResult]:
+    """The results of the position of a point, link or pair, or of "B to E" (two points), by the results' names.
+
+    Raises Unknown.
+    """
+    parameters = Parameters(moving.mechanism)
+    coordinates = constraint_elements(moving.mechanism).coordinates(moving)[0]
+    return _results_at(KinematicSlopes(parameters, [coordinates], Directions(parameters, ())).motion, moving, name)
+
+
+def _results_at(motion: CoordinateMotion, moving: KinematicResult, name: str) -> dict[str, NamedResult]:
+    points = moving._point_members
+    results = kinematic_results(motion, points, name)
+    if results:
+        return {result.name: result for result in results}
+    first, _, second = name.partition(" to ")
+    for end in (first, second) if second else (first,):
+        if end not in points:
+            raise unknown_name(moving, end)
+    places = (kinematic_results(motion, points, end)[0].parts for end in (first, second))
+    x, y = (one - other for one, other in zip(*places, strict=True))
+    return {"distance": NamedResult("distance", "length", (sqrt(x * x + y * y),))}
+
+
+class PredictedResults:
+    """Results, (name, result) each, of mechanisms that differ from one in some numbers."""
+
+    def __init__(self, mechanism: Mechanism, results: Sequence[tuple[str, str]], numbers: Sequence[str]):
+        self.parameters = Parameters(mechanism)
+        self.results = tuple(results)
+        self.input_count = len(mechanism.inputs)
+        columns = [*range(self.input_count), *map(self.parameters.names.index, numbers)]
+        self.directions = Directions(self.parameters, columns)
+
+    def at_inputs(self, mechanism: Mechanism, inputs: Array) -> PredictedValues:
+        """The results of a mechanism at positions of its inputs (n, inputs), rad or m. Raises NoAnswer."""
+        if self.input_count == 1:
+            with suppress(NoAnswer):  # of a single position the reason is told
+                return self.along(motion_over_input(mechanism, inputs[:, 0]))
+        states = [
+            solve(mechanism, dict(zip(self.parameters.inputs, map(float, position), strict=True)))
+            for position in inputs
+        ]
+        elements = constraint_elements(mechanism)
+        coordinates = np.concatenate([elements.coordinates(state)[0] for state in states])
+        return self._predict(coordinates, states[0])
+
+    def along(self, motion: Motion) -> PredictedValues:
+        """The results at every position of a motion."""
+        return self._predict(constraint_elements(motion.mechanism).coordinates(motion)[0], motion)
+
+    def _predict(self, coordinates: Array, moving: KinematicResult) -> PredictedValues:
+        numbers = [value_at(moving.mechanism, dimension.address) for dimension in self.parameters.dimensions]
+        kinematics = KinematicSlopes(self.parameters, [coordinates], self.directions, numbers)
+        parts = [
+            part for name, result in self.results for part in _results_at(kinematics.motion, moving, name)[result].parts
+        ]
+        shape = len(coordinates), self.directions.count
+        values, slopes = stack_results(parts, 0, shape[:1]), stack_results(parts, 1, shape)
+        count = self.input_count
+        return PredictedValues(values, slopes[..., :count], slopes[..., count:], kinematics.is_singular)

@@ -2,36 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Protocol
 
-from planar.foundation.geometry import Frame, Vector
+from planar.dynamics.external_actions import LinkMotion
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar, atan2
-from planar.model.link_shapes import LinkShape
 from planar.model.loads import Load
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
-
-
-class PlacedLinks(Protocol):
-    """A mechanism whose links have places, of any arithmetic."""
-
-    @property
-    def mechanism(self) -> Mechanism:
-        """The mechanism."""
-
-    @property
-    def frames(self) -> Mapping[str, Frame]:
-        """The axes of its links."""
-
-    @property
-    def shapes(self) -> Mapping[str, LinkShape]:
-        """The shapes of its links."""
-
-    @property
-    def relative_motions(self) -> Mapping[str, Pair]:
-        """Its relative motions by name."""
 
 
 def loaded_output(mechanism: Mechanism, pair: Pair) -> Mechanism:
@@ -41,18 +20,18 @@ def loaded_output(mechanism: Mechanism, pair: Pair) -> Mechanism:
 
 
 def output_angle(
-    links: PlacedLinks, output: tuple[str, Pair], through: tuple[str, ...], forces: Iterable[Vector]
+    links: LinkMotion, output: tuple[str, Pair], through: tuple[str, ...], forces: Iterable[Vector]
 ) -> Scalar:
     """The angle (rad) between the forces of the other moving links on the output, (link, pair), and its lever, or
     across its way; `through` are the pairs by which they act."""
     parts = [*forces]
     force = Vector(sum(part.x for part in parts), sum(part.y for part in parts))
-    way = _output_direction(links, output, through[0])
-    cross, dot = abs(way.cross(force)), abs(way.dot(force))
+    direction = _output_direction(links, output, through[0])
+    cross, dot = abs(direction.cross(force)), abs(direction.dot(force))
     return atan2(dot, cross) if output[1].input_kind is MeasureKind.LENGTH else atan2(cross, dot)
 
 
-def _output_direction(links: PlacedLinks, output: tuple[str, Pair], driving: str) -> Vector:
+def _output_direction(links: LinkMotion, output: tuple[str, Pair], driving: str) -> Vector:
     """Along the slide, or from the fixed pin to where the force acts."""
     link, pair = output
     if pair.input_kind is MeasureKind.LENGTH:
@@ -60,10 +39,15 @@ def _output_direction(links: PlacedLinks, output: tuple[str, Pair], driving: str
         assert direction is not None
         return direction
     driving_pair = next(other for other in links.mechanism.pairs if other.name == driving)
-    rides = driving_pair.point_on_line()
-    members = [member for member in driving_pair.coincident_points() if member[0] == link]
-    place = members[0] if members else rides and rides[0]
+    place = force_point(driving_pair, link)
     pin = next(member for member in pair.coincident_points() if member[0] == links.mechanism.frame)
     assert place is not None
-    end, fixed = (links.frames[name].to_world(links.shapes[name].position(point)) for name, point in (place, pin))
+    end, fixed = (links.place(name, links.shapes[name].position(point)) for name, point in (place, pin))
     return end - fixed
+
+
+def force_point(pair: Pair, link: str) -> tuple[str, str] | None:
+    """The (link, point) where a pair's force on a link acts: of that link if it can be."""
+    members = [member for member in pair.coincident_points() if member[0] == link]
+    rides = pair.point_on_line()
+    return members[0] if members else rides and rides[0]

@@ -8,7 +8,7 @@ import pytest
 
 import planar
 from planar.derivatives.design_equations import design_equations
-from planar.derivatives.result_expressions import kinematic_expressions
+from planar.derivatives.kinematic_slopes import kinematic_results
 from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
 from tests.draws import covering
 from tests.known import MODELS
@@ -55,16 +55,17 @@ class DigitSolver:
     def __init__(self, state, of):
         design = design_equations(state.mechanism)
         unknowns, (t,) = design.coordinates_at(state)
-        self.t, self.names, self.scale = exactly(t), design.names, design.scale
+        self.t, self.names = exactly(t), design.names
         x = ca.vertcat(design.z, design.z1, design.z2)
         G = ca.vertcat(design.F, *design.rates(design.F))
         self.equations = ca.Function("G", [x, design.t], [ca.densify(G)])
         self.x = exactly(np.concatenate([each[0] for each in unknowns]))
         jacobian = ca.Function("J", [x, design.t], [ca.densify(ca.jacobian(G, x))])
         self.inverse = np.linalg.inv(np.array(jacobian(np.concatenate([each[0] for each in unknowns]), t)))
-        told = list(kinematic_expressions(design, state, of))
-        self.results = [each.name for each in told]
-        self.values = ca.Function("r", [x, design.t], [ca.densify(each.value) for each in told])
+        results = kinematic_results(design.motion, state._point_members, of)
+        self.results = [result.name for result in results]
+        values = [ca.densify(ca.vertcat(*result.parts)) for result in results]
+        self.values = ca.Function("r", [x, design.t], values)
 
     def solve(self, t) -> list[list]:
         """All results, part by part, at numbers t."""

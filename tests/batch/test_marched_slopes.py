@@ -7,7 +7,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import design_variables
-from planar.batch.named_results import result_block
+from planar.batch.named_results.design_slopes import DesignSlopes
 from planar.derivatives.design_equations import design_equations
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.foundation.errors import PlanarError
@@ -25,7 +25,7 @@ def both_ways(monkeypatch, mechanism, designs, steps, **asked):
     """A sweep with derivatives as it comes, and with those by the places of links alone."""
     quick = planar.sweep(mechanism, designs, steps, **asked)
     with monkeypatch.context() as patched:
-        patched.setattr(result_block, "march_block_slopes", lambda *given: None)
+        patched.setattr(DesignSlopes, "march_block", lambda *given: None)
         return quick, planar.sweep(mechanism, designs, steps, **asked)
 
 

@@ -58,13 +58,27 @@ def test_a_sweep_goes_on_with_the_blocks_that_are_missing(store):
     assert told == [9]
 
 
+def test_a_sweep_goes_on_in_the_blocks_of_the_store_whatever_size_is_asked_for(store):
+    def stop(done, many):
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        little(store, progress=stop)
+    told = []
+    found = little(store, block=3, progress=lambda done, many: told.append(done))
+    assert told == [4, 5]
+    equal(found, little(None))
+
+
 LITTLE = four_bar(*TRIPLE, 1.2)
 
 
 def little(store, **more):
     """A sweep of three blocks, in few files, whose designs come to dead points."""
     lengths, there = {"BC.length": [0.7, 0.72, 0.73, 0.74, 0.76]}, {"start": 1.2, "stop": 1.5}
-    return planar.sweep(LITTLE, lengths, 6, "E", rates=False, block=2, workers=1, store=store, **there, **more)
+    more = {"block": 2} | more
+    return planar.sweep(LITTLE, lengths, 6, "E", rates=False, workers=1, store=store, **there, **more)
 
 
 def equal(found, wanted, again=None):

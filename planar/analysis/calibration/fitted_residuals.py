@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.calibration.measurements import Measurement
-from planar.derivatives.predicted_results import PredictedResults, PredictedValues
+from planar.derivatives.result_slopes import PredictedResults, PredictedValues
 from planar.document.revised.changed_numbers import with_values
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.derivatives.predicted_results import position_results
+from planar.derivatives.result_slopes import position_results
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, join_names
 from planar.model.mechanism import Mechanism

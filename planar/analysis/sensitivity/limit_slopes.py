@@ -12,7 +12,7 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.time_ratio import Passage, TimeRatio, find_time_ratio
 from planar.derivatives.design_equations import design_equations
-from planar.derivatives.limit_systems import LimitEquations, LimitPoint, LimitSystem
+from planar.derivatives.design_systems import LimitEquations, LimitPoint, LimitSystem
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.results.motion import Motion, State
@@ -72,7 +72,7 @@ def dead_point_slopes(motion: Motion, offsets: tuple[str, ...] = ()) -> tuple[Li
         if limit.kind != "input dead point" or limit.of != running:
             continue
         row = int(np.argmin(np.abs(motion.inputs[running].position - limit.input)))
-        point = system.dead_point(motion, row)
+        point = system.solve(system.dead_point_equations(motion, row))
         if point is not None and abs(point.input - limit.input) <= NEAR * max(1.0, design.solver.unit):
             found.append(_limit_slopes("input dead point", running, limit.input, limit.value, system, point))
     return tuple(found)
@@ -167,7 +167,7 @@ class _TravelDerivatives:
         return self.system.turning_point_equations(self._state(end), self.output.name)
 
     def _end(self, kind: str, end: Extreme) -> LimitSlopes:
-        point = self.system.turning_point(self._state(end), self.output.name)
+        point = self.system.solve(self.equations(end))
         if point is None:
             raise NoAnswer(Outcome.CHANGE_POINT, "an end of the travel does not move smoothly with the dimensions")
         return _limit_slopes(kind, self.output.name, end.input, end.value, self.system, point)

@@ -15,9 +15,9 @@ from planar.analysis.sensitivity.limit_slopes import dead_point_equations, trave
 from planar.analysis.tolerance.guaranteed import Guaranteed
 from planar.analysis.tolerance.variations import Variations
 from planar.analysis.tolerance.varied import Varied, mean_slopes
-from planar.derivatives.design_enclosures import limit_over_boxes
+from planar.derivatives.design_systems import LimitEquations, LimitSystem
+from planar.derivatives.enclosures import ParametricSystem
 from planar.derivatives.intervals import down, up
-from planar.derivatives.limit_systems import LimitEquations, LimitSystem
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.results.motion import Motion
@@ -29,7 +29,7 @@ def guaranteed_travel(motion: Motion, of: str, variations: Variations) -> Guaran
     """Of a stroke or swing. Raises NoAnswer where its ends are not proved to follow the deviations."""
     system, ends = travel_end_equations(motion, of, tuple(each.pair for each in variations.offsets))
     varied = _varied(system, variations)
-    low, high = ([_value_slopes(system, each, varied, of) for each in places] for places in ends)
+    low, high = ([_value_slopes(each, varied, of) for each in places] for places in ends)
     bands = [varied.deviations(down(one[0] - other[1]), up(one[1] - other[0])) for one, other in product(high, low)]
     # of ends that tie in the nominal mechanism any may be the farthest
     return _guaranteed([(min(each[0] for each in bands), max(each[1] for each in bands))], len(low) + len(high))
@@ -39,7 +39,7 @@ def guaranteed_dead_points(motion: Motion, variations: Variations) -> Guaranteed
     """Of all dead points of the running input. Raises NoAnswer."""
     system, limits = dead_point_equations(motion, tuple(each.pair for each in variations.offsets))
     varied = _varied(system, variations)
-    slopes = [_value_slopes(system, each, varied, motion.running_input) for each in limits]
+    slopes = [_value_slopes(each, varied, motion.running_input) for each in limits]
     return _guaranteed([varied.deviations(*each) for each in slopes], len(limits))
 
 
@@ -53,20 +53,20 @@ def _varied(system: LimitSystem, variations: Variations) -> Varied:
     return Varied(columns, 0, lower, upper, len(variations.offsets))
 
 
-def _value_slopes(system: LimitSystem, limit: LimitEquations, varied: Varied, of: str) -> tuple[Array, Array]:
+def _value_slopes(limit: LimitEquations, varied: Varied, of: str) -> tuple[Array, Array]:
     """What slopes of a limit's value are between (1, 1, varied)."""
-    equations = limit_over_boxes(system, limit, sorted(set(varied.columns.tolist())))
-    base = np.concatenate([limit.numbers, limit.known])
+    columns = sorted(set(varied.columns.tolist()))
+    equations = ParametricSystem(limit.unknowns, limit.parameters, limit.equations, limit.value, columns)
     bounds = np.minimum(varied.lower, 0.0)[None], np.maximum(varied.upper, 0.0)[None]
     none = np.zeros_like(bounds[0])
-    narrow = equations.enclose(varied.boxes_of_t(base, none, none), limit.start[None], START_STEPS)
+    narrow = equations.enclose(varied.boxes_of_t(limit.numbers, none, none), limit.start[None], START_STEPS)
     place = [equations.columns.index(column) for column in varied.columns]
     start = narrow.middle + (narrow.tangents[..., place] @ (0.5 * (bounds[0] + bounds[1]))[:, :, None])[:, :, 0]
-    found = equations.enclose(varied.boxes_of_t(base, *bounds), start)
+    found = equations.enclose(varied.boxes_of_t(limit.numbers, *bounds), start)
     if not found.holds(narrow)[0]:
         told = f"it is undecided whether all mechanisms within the tolerances have the limits of {of!r}: tighten them"
         raise NoAnswer(Outcome.TOO_INEXACT, told)
-    return mean_slopes(equations, varied, base, bounds, found)
+    return mean_slopes(equations, varied, limit.numbers, bounds, found)
 
 
 def _guaranteed(bands: list[tuple[Array, Array]], boxes: int) -> Guaranteed:

@@ -4,64 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.named_results.design_frames import DesignFrames
-from planar.batch.named_results.result_rows import RequestedResults
+from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
+from planar.derivatives.transmission_system import force_point, loaded_output, output_angle
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.frictional_forces import solve_with_friction
 from planar.dynamics.load_variation import load_factors
 from planar.dynamics.reaction_solver import ReactionSolver
-from planar.dynamics.reactions import input_efforts, pair_reaction
+from planar.dynamics.reactions import DETERMINED_TOLERANCE, input_efforts, pair_reaction
+from planar.dynamics.sharing.least_work import Wrench
 from planar.dynamics.virtual_work import balance_equations
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
-from planar.foundation.geometry import Frame
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import BadInput
+from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.output_pair import find_output_pair
+from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
+from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
-
-Array = np.ndarray
-Found = dict[tuple[str, str], Array]
-"""Results (numbers, steps + 1, designs) by quantity and name."""
-
-
-def find_forces(
-    mechanism: Mechanism,
-    results: RequestedResults,
-    frames: DesignFrames,
-    values: Mapping[str, Array],
-    is_solved: Array,
-) -> Found:
-    """Efforts (N m, N) and reactions (N, with their couples, N m) of designs with `values` (designs,) by name.
-
-    `is_solved` (steps + 1, designs). NaN where positions or rates are not there, for what equilibrium does not tell,
-    and where friction jams.
-    """
-    shape, names = frames.design_shape, [given.pair for given in mechanism.inputs]
-    found: Found = {("effort", name): np.full((1, *shape), np.nan) for name in results.efforts}
-    found |= {("reaction", name): np.full((2, *shape), np.nan) for name in results.reactions}
-    found |= {("reaction_couple", name): np.full((1, *shape), np.nan) for name in results.reactions}
-    for positions in position_chunks(mechanism, frames, values, is_solved):
-        reactions = design_reaction_solver(mechanism, frames, positions, values)
-        field = reactions.field
-        solved = solve_with_friction(reactions, field)
-        at = slice(None), positions.steps, positions.designs
-        supplied = input_efforts(solved)[0]
-        for name in results.efforts:
-            found["effort", name][at] = supplied[:, names.index(name)]
-        for name in results.reactions:
-            own = pair_reaction(reactions.pairs[name], field, reactions, solved)
-            found["reaction", name][at] = own.force.T
-            found["reaction_couple", name][at] = own.couple
-    return found
-
 
 MAX_CHUNK_POSITIONS = 4096
 """Positions whose forces are found at once."""
+NEGLIGIBLE_FORCE = 1e-7
+"""A force below this part of the greatest on the output, or a moment below this part at an arm of the size, is none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,18 +49,66 @@ class DesignPositions(KinematicResult):
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
     shapes: Mapping[str, LinkShape]
-    designs: Array
-    steps: Array
+    designs: IntArray
+    steps: IntArray
 
 
-def design_reaction_solver(
+def position_chunks(
+    mechanism: Mechanism, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray
+) -> Iterator[DesignPositions]:
+    """The positions that are solved (steps + 1, designs), with rates, some designs at a time."""
+    finite, all_frames = is_solved.copy(), frames.frames
+    for frame in all_frames.values():
+        for part in () if frame.fixed else (frame.x, frame.y, frame.angle):
+            for rate in part.parts:
+                finite &= np.isfinite(rate)
+    size = 1 if _one_by_one(mechanism, values) else max(1, MAX_CHUNK_POSITIONS // len(finite))
+    for first in range(0, finite.shape[1], size):
+        steps, columns = np.nonzero(finite[:, first : first + size])
+        if not steps.size:
+            continue
+        designs = columns + first
+        places = steps, designs
+        if size == 1:
+            changed = with_design_values(mechanism, values_of_design(values, first))
+        else:
+            changed = with_design_values(mechanism, {name: np.asarray(each)[designs] for name, each in values.items()})
+        own = {
+            pair.name: tuple(_select(coordinate, places) for coordinate in frames.own_coordinates(pair))
+            for pair in frames.mechanism.pairs
+            if pair.coordinate_kinds
+        }
+        selected = {link: _select_frame(frame, places) for link, frame in all_frames.items()}
+        yield DesignPositions(changed, selected, own, shapes_of_links(changed), designs, steps)
+
+
+def _select_frame(frame: Frame, places: tuple[IntArray, IntArray]) -> Frame:
+    if frame.fixed:
+        return frame
+    x, y, cosine, sine, angle = (_select(part, places) for part in frame[:5])
+    return Frame(x, y, cosine, sine, angle)
+
+
+def _select(value: Scalar, places: tuple[IntArray, IntArray]) -> Jet:
+    return Jet(*(np.broadcast_to(part, np.shape(value.parts[0]))[places] for part in value.parts))
+
+
+def _one_by_one(mechanism: Mechanism, values: Mapping[str, Array]) -> bool:
+    """Whether designs differ in what only numbers can stand for: wheels' sizes, and courses of loads."""
+    variables = design_variables(mechanism)
+    toothed = any(type(pair).tooth_contact is not Pair.tooth_contact for pair in mechanism.pairs)
+    changed = [variables[name] for name in values]
+    return any((toothed and each.path[0] == "pairs") or "varies" in each.address for each in changed)
+
+
+def _reaction_solver(
     mechanism: Mechanism, frames: DesignFrames, positions: DesignPositions, values: Mapping[str, Array]
 ) -> ReactionSolver:
     """The balance at positions of a mechanism's designs, which have these values (designs,) by name."""
     equations = balance_equations(mechanism)
     field = KinematicArrays(positions, mechanism_size(mechanism, shapes_of_links(mechanism)))
-    at = positions.steps, positions.designs
-    inputs = {name: np.broadcast_to(value, frames.design_shape)[at] for name, value in frames.inputs.items()}
+    places = positions.steps, positions.designs
+    inputs = {name: np.broadcast_to(value, frames.design_shape)[places] for name, value in frames.inputs.items()}
     time = None if frames.time is None else frames.time[positions.steps]
     factors = load_factors(positions.mechanism, inputs, time, field.position_count)
     q: Array = np.zeros((equations.link_coordinate_count, frames.design_shape[1]))
@@ -96,54 +118,110 @@ def design_reaction_solver(
     return ReactionSolver(equations, equations.balance(field, factors, True, turns[:, positions.designs]), field)
 
 
-def position_chunks(
-    mechanism: Mechanism, frames: DesignFrames, values: Mapping[str, Array], is_solved: Array
-) -> Iterator[DesignPositions]:
-    """The positions that are solved (steps + 1, designs), with rates, some designs at a time."""
-    finite, every = is_solved.copy(), frames.frames
-    for frame in every.values():
-        for part in () if frame.fixed else (frame.x, frame.y, frame.angle):
-            for each in part.parts:
-                finite &= np.isfinite(each)
-    size = 1 if _one_by_one(mechanism, values) else max(1, MAX_CHUNK_POSITIONS // len(finite))
-    for first in range(0, finite.shape[1], size):
-        steps, columns = np.nonzero(finite[:, first : first + size])
-        if not steps.size:
-            continue
-        designs, at = columns + first, (steps, columns + first)
-        own = (
-            values_of_design(values, first)
-            if size == 1
-            else {name: np.asarray(value)[designs] for name, value in values.items()}
-        )
-        changed = with_design_values(mechanism, own)
-        yield DesignPositions(
-            changed,
-            {link: _frame_at(frame, at) for link, frame in every.items()},
-            {
-                pair.name: tuple(_at(each, at) for each in frames.own_coordinates(pair))
-                for pair in frames.mechanism.pairs
-                if pair.coordinate_kinds
-            },
-            shapes_of_links(changed),
-            designs,
-            steps,
-        )
+def find_forces(
+    mechanism: Mechanism,
+    results: RequestedResults,
+    frames: DesignFrames,
+    values: Mapping[str, Array],
+    is_solved: BoolArray,
+    arrays: NamedArrays,
+) -> None:
+    """Fill in efforts (N m, N) and reactions (N, with their couples, N m) of designs with `values` (designs,) by name.
+
+    `is_solved` (steps + 1, designs). NaN stays where positions or rates are not there, for what equilibrium does not
+    tell, and where friction jams.
+    """
+    inputs = [driven.pair for driven in mechanism.inputs]
+    for positions in position_chunks(mechanism, frames, values, is_solved):
+        reactions = _reaction_solver(mechanism, frames, positions, values)
+        solution = solve_with_friction(reactions, reactions.field)
+        places = slice(None), positions.steps, positions.designs
+        efforts = input_efforts(solution)[0]
+        for name in results.efforts:
+            arrays["effort", name][places] = efforts[:, inputs.index(name)]
+        for name in results.reactions:
+            reaction = pair_reaction(reactions.pairs[name], reactions.field, reactions, solution)
+            arrays["reaction", name][places] = reaction.force.T
+            arrays["reaction_couple", name][places] = reaction.couple
 
 
-def _one_by_one(mechanism: Mechanism, values: Mapping[str, Array]) -> bool:
-    """Whether designs differ in what only numbers can stand for: wheels' sizes, and courses of loads."""
-    known = design_variables(mechanism)
-    toothed = any(type(pair).tooth_contact is not Pair.tooth_contact for pair in mechanism.pairs)
-    changed = [known[name] for name in values]
-    return any((toothed and each.path[0] == "pairs") or "varies" in each.address for each in changed)
+class OutputLink:
+    """An output link, with the pairs by which other moving links may drive it. Raises Unknown, BadInput.
+
+    The rule is that of `planar.transmission`: inputs hold still, links are weightless, and the output alone is loaded.
+    """
+
+    def __init__(self, mechanism: Mechanism, output: str):
+        self.link, self.pair = find_output_pair(mechanism, output)
+        self.mechanism = loaded_output(mechanism, self.pair)
+        self.slides = self.pair.input_kind is MeasureKind.LENGTH
+        self.driving_pairs = {pair.name: pair for pair in mechanism.pairs if self._can_drive(pair)}
+        if not self.driving_pairs:
+            raise self._undriven()
+        motions = relative_motions(mechanism)
+        driving_inputs = [driven.pair for driven in mechanism.inputs if self._can_drive(motions[driven.pair])]
+        if driving_inputs:
+            told = f"the input at {driving_inputs[0]} itself drives {self.link} from another moving link"
+            raise BadInput(self.link, f"{told}; planar.transmission tells whether it has a transmission angle")
+
+    def _undriven(self) -> BadInput:
+        told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
+        return BadInput(self.link, told)
+
+    def _can_drive(self, pair: Pair) -> bool:
+        others = [body for body in pair.bodies if body not in (self.link, self.mechanism.frame)]
+        return self.link in pair.bodies and bool(others) and pair.entry_name() != self.pair.entry_name()
+
+    def angles(self, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray) -> Array:
+        """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
+        angles = np.full(frames.design_shape, np.nan)
+        variables = design_variables(self.mechanism)
+        # numbers of loads, springs and masses change nothing
+        kept = {name for name, variable in variables.items() if variable.path[0] != "loads"}
+        known = {name: value for name, value in values.items() if name in kept}
+        for positions in position_chunks(self.mechanism, frames, known, is_solved):
+            reactions = _reaction_solver(self.mechanism, frames, positions, known)
+            angles[positions.steps, positions.designs] = self._angles_at(reactions)
+        return angles
+
+    def _angles_at(self, reactions: ReactionSolver) -> Array:
+        """The angle at all positions (n,); 0 where nothing balances the load."""
+        solution, arm = reactions.solve(), reactions.arm
+        wrenches = {name: solution.wrenches[name][self.link] for name in self.driving_pairs}
+        unit = 1.0 if self.slides else 1.0 / arm  # of a force that balances the load
+        names = []
+        for name, wrench in wrenches.items():
+            size = np.maximum(np.hypot(*wrench.force.T), np.abs(wrench.moment) / arm)
+            if np.any(size[solution.is_balanced] > NEGLIGIBLE_FORCE * unit):
+                names.append(name)
+        if not names and solution.is_balanced.any():
+            raise self._undriven()
+        names = names or [*wrenches]
+        force, moment = (np.sum([wrenches[name][k] for name in names], axis=0) for k in range(2))
+        changes = [solution.wrench_changes[name][self.link].force for name in names]
+        change = np.max([np.abs(each).max(axis=(1, 2), initial=0.0) for each in changes], axis=0)
+        force = np.where((change <= DETERMINED_TOLERANCE)[:, None], force, np.nan)
+        if not self.slides:
+            self._check_line(reactions.field, names, Wrench(force, moment))
+        angle = output_angle(reactions.field, (self.link, self.pair), (*names,), [Vector(*force.T)])
+        return np.where(solution.is_balanced, angle, 0.0)
+
+    def _check_line(self, field: KinematicArrays, names: list[str], driving: Wrench) -> None:
+        """Refuse what drives a turning output by more than a force at one point. Raises BadInput."""
+        places = {force_point(self.driving_pairs[name], self.link) for name in names}
+        place = places.pop()
+        if places or place is None:
+            told = f"{self.link} is driven at several places, or by wheels"
+            raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
+        link, point = place
+        couple = np.abs(driving.moment_about(field.point_rates(link, field.shapes[link].position(point))))
+        # beside the torque of one that it balances
+        if np.max(couple[np.isfinite(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
+            told = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
+            raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
 
 
-def _frame_at(frame: Frame, at: tuple[Array, Array]) -> Frame:
-    if frame.fixed:
-        return frame
-    return Frame(_at(frame.x, at), _at(frame.y, at), _at(frame.cos, at), _at(frame.sin, at), _at(frame.angle, at))
-
-
-def _at(value: Scalar, at: tuple[Array, Array]) -> Jet:
-    return Jet(*(np.broadcast_to(part, np.shape(value.parts[0]))[at] for part in value.parts))
+@lru_cache(maxsize=16)
+def output_link(mechanism: Mechanism, output: str) -> OutputLink:
+    """An output link, kept. Raises Unknown, BadInput."""
+    return OutputLink(mechanism, output)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from math import comb
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, links_counting_turns, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
-
-Array = np.ndarray
 
 LONGEST_CLEAR_TURN = 2.0
 """rad by which a link may have turned from a step to the next: of more it is not clear in which sense it turned."""
@@ -29,7 +26,8 @@ class DesignFrames:
 
     `shapes` have numbers, or an array (designs,) where designs differ; `inputs` are the positions of inputs, each an
     array that spreads over (steps + 1, designs). `places` are, of every link but the frame, the origin of its axes and
-    the place at `arm` (m) on its x-axis, each (orders, steps + 1, 2, designs): positions, then first and second rates.
+    the place at `arm` (m) on its x-axis, each (orders, steps + 1, 2, designs): positions, then first and second rates;
+    `time` (steps + 1,) that of a run in time (s).
     """
 
     def __init__(
@@ -39,14 +37,14 @@ class DesignFrames:
         inputs: Mapping[str, Array],
         places: Mapping[str, tuple[Array, Array]],
         arm: float,
+        time: Array | None = None,
     ):
-        self.mechanism, self.shapes, self.inputs = mechanism, shapes, inputs
-        self.time: Array | None = None
-        "of a run in time (s), (steps + 1,)"
+        self.mechanism, self.shapes, self.inputs, self.time = mechanism, shapes, inputs, time
         self.motions = relative_motions(mechanism)
         self.counted_links = links_counting_turns(mechanism)
-        directions = {link: (axis - origin) / arm for link, (origin, axis) in places.items()}
-        angles = {link: np.arctan2(each[0, :, 1], each[0, :, 0]) for link, each in directions.items()}
+        self.origins = {link: origin for link, (origin, _) in places.items()}
+        self.directions = {link: (axis - origin) / arm for link, (origin, axis) in places.items()}
+        angles = {link: np.arctan2(axis[0, :, 1], axis[0, :, 0]) for link, axis in self.directions.items()}
         self.is_clear = np.ones(next(iter(angles.values())).shape[1], dtype=bool)
         "the designs of which it is clear how far their links have turned (designs,)"
         for link, angle in angles.items():
@@ -56,8 +54,6 @@ class DesignFrames:
             angles[link] = np.concatenate([angle[:1], angle[:1] + np.cumsum(turned, axis=0)])
         self.design_shape = next(iter(angles.values())).shape
         "(steps + 1, designs)"
-        self.origins = {link: origin for link, (origin, _) in places.items()}
-        self.directions = directions
         self._set_angles(self._with_counted_turns(angles))
 
     def _set_angles(self, angles: Mapping[str, Array]) -> None:
@@ -68,15 +64,14 @@ class DesignFrames:
     def angle(self, link: str) -> tuple[Array, ...]:
         """A link's angle with all its turns (steps + 1, designs), and rates where these are there."""
         cos, sin = (self.directions[link][0, :, axis] for axis in (0, 1))
-        rates = (cos * each[:, 1] - sin * each[:, 0] for each in self.directions[link][1:])
+        rates = (cos * rate[:, 1] - sin * rate[:, 0] for rate in self.directions[link][1:])
         return (self.angles[link], *rates)
 
     def frame(self, link: str) -> Frame:
         """The frame of a link."""
         if link not in self._frames:
-            x, y, cos, sin = (
-                _jet(*each[link][:, :, axis]) for each in (self.origins, self.directions) for axis in (0, 1)
-            )
+            vectors = self.origins[link], self.directions[link]
+            x, y, cos, sin = (_jet(*vector[:, :, axis]) for vector in vectors for axis in (0, 1))
             self._frames[link] = Frame(x, y, cos, sin, _jet(*self.angle(link)))
         return self._frames[link]
 
@@ -85,12 +80,12 @@ class DesignFrames:
         """The frames of all links."""
         return {link: self.frame(link) for link in (self.mechanism.frame, *self.angles)}
 
-    def replace_angles(self, designs: Array, angles: Mapping[str, Array]) -> None:
+    def replace_angles(self, designs: IntArray, angles: Mapping[str, Array]) -> None:
         """Take other angles (steps + 1, designs) of some designs, of which more is known."""
-        whole = {link: angle.copy() for link, angle in self.angles.items()}
-        for link, each in angles.items():
-            whole[link][:, designs] = each
-        self._set_angles(whole)
+        replaced = {link: angle.copy() for link, angle in self.angles.items()}
+        for link, angle in angles.items():
+            replaced[link][:, designs] = angle
+        self._set_angles(replaced)
         self.is_clear[designs] = True
 
     def _with_counted_turns(self, angles: dict[str, Array]) -> dict[str, Array]:
@@ -101,54 +96,54 @@ class DesignFrames:
         """
         if self.counted_links.isdisjoint(angles):
             return angles
-        ties: list[tuple[tuple[str, ...], Callable[[Mapping[str, Array]], Scalar]]] = []
-        for name, position in self.inputs.items():
-            pair = self.motions[name]
-            if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.isdisjoint(pair.bodies):
-                ties.append((pair.bodies, partial(self._input_gap, pair, position[0])))
-        ties += [(pair.bodies, partial(self._turn_gap, pair)) for pair in self.mechanism.pairs if pair.counts_turns]
-        tied = [link for link in angles if any(link in bodies for bodies, _ in ties)]
-        here = {link: angle[0] for link, angle in angles.items()}
-        off = np.stack([np.broadcast_to(gap(here), self.design_shape[1:]) for _, gap in ties], axis=-1)
-        further = [
-            np.stack([gap(here | {link: here[link] + FULL_TURN}) + 0.0 * off[:, 0] for _, gap in ties], axis=-1)
-            for link in tied
-        ]
-        change = np.nan_to_num(np.stack(further, axis=-1) - off[:, :, None])  # (designs, ties, links)
+        bodies = {body for pairs in self._turn_ties() for pair in pairs for body in pair.bodies}
+        tied = [link for link in angles if link in bodies]
+        start = {link: angle[0] for link, angle in angles.items()}
+        gaps = self._start_gaps(start)
+        changed = [self._start_gaps(start | {link: start[link] + FULL_TURN}) for link in tied]
+        change = np.nan_to_num(np.stack(changed, axis=-1) - gaps[:, :, None])  # (designs, ties, links)
         s = np.linalg.svd(change, compute_uv=False)
         self.is_clear &= (change.shape[2] <= change.shape[1]) & (s[:, -1] > LEAST_TIE * s[:, 0])
-        turns = np.round(-np.linalg.pinv(change) @ off[:, :, None])[..., 0]
-        left = np.abs(off + np.einsum("dtl,dl->dt", change, turns)).max(axis=1)
-        self.is_clear &= left <= LEAST_TIE * s[:, 0]
-        for link, own in zip(tied, turns.T, strict=True):
-            angles[link] = angles[link] + FULL_TURN * own
+        turns = np.round(-np.linalg.pinv(change) @ gaps[:, :, None])[..., 0]
+        residual = np.abs(gaps + np.einsum("dtl,dl->dt", change, turns)).max(axis=1)
+        self.is_clear &= residual <= LEAST_TIE * s[:, 0]
+        for link, link_turns in zip(tied, turns.T, strict=True):
+            angles[link] = angles[link] + FULL_TURN * link_turns
         return angles
 
-    def _input_gap(self, pair: Pair, position: Array, angles: Mapping[str, Array]) -> Scalar:
-        """By how much an input's angle at the start is off its position, where links have these angles (designs,)."""
-        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        return pair.input_position([self._start_frame(link, angles) for link in pair.bodies], numbers, ()) - position
+    def _turn_ties(self) -> tuple[list[Pair], list[Pair]]:
+        """The relative motions of inputs, and the pairs, that tell how many turns links have made."""
+        inputs = [
+            pair
+            for pair in map(self.motions.__getitem__, self.inputs)
+            if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.isdisjoint(pair.bodies)
+        ]
+        return inputs, [pair for pair in self.mechanism.pairs if pair.counts_turns]
 
-    def _turn_gap(self, pair: Pair, angles: Mapping[str, Array]) -> Scalar:
-        """What a pair that counts turns leaves open at the start, where links have these angles (designs,)."""
-        frames = [self._start_frame(link, angles) for link in pair.bodies]
-        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        left = pair.residual(frames, numbers, solve_own_coordinates(pair, frames, numbers))
-        (row,) = set(range(len(left))).difference(_rows_without_turns(pair))
-        return left[row]
+    def _start_gaps(self, angles: Mapping[str, Array]) -> Array:
+        """By how much the ties are open at the start (designs, ties), where links have these angles (designs,)."""
+        frames = {self.mechanism.frame: GROUND}
+        for link, angle in angles.items():
+            origin = self.origins[link][0, 0]
+            frames[link] = frame_at(origin[0], origin[1], angle)
+        inputs, pairs = self._turn_ties()
+        gaps = [pair.input_position_at(self.shapes, frames, {}) - self.inputs[pair.name][0] for pair in inputs]
+        for pair in pairs:
+            arguments = self._pair_arguments(pair, frames)
+            residual = pair.residual(*arguments, solve_own_coordinates(pair, *arguments))
+            (row,) = set(range(len(residual))).difference(_rows_without_turns(pair))
+            gaps.append(residual[row])
+        return np.stack([np.broadcast_to(gap, self.design_shape[1:]) for gap in gaps], axis=-1)
 
-    def _start_frame(self, link: str, angles: Mapping[str, Array]) -> Frame:
-        if link == self.mechanism.frame:
-            return GROUND
-        origin = self.origins[link][0, 0]
-        return frame_at(origin[0], origin[1], angles[link])
+    def _pair_arguments(self, pair: Pair, frames: Mapping[str, Frame]) -> tuple[list[Frame], list[Scalar]]:
+        """The frames and the numbers that the formulas of a pair take."""
+        return [frames[link] for link in pair.bodies], [*pair.measure([self.shapes[link] for link in pair.bodies])]
 
     def own_coordinates(self, pair: Pair) -> tuple[Jet | Array, ...]:
         """The own coordinates of a pair."""
         if pair.coordinate_kinds and pair.name not in self.own:
-            frames = [self.frame(link) for link in pair.bodies]
-            numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-            self.own[pair.name] = tuple(solve_own_coordinates(pair, frames, numbers))
+            frames = {link: self.frame(link) for link in pair.bodies}
+            self.own[pair.name] = tuple(solve_own_coordinates(pair, *self._pair_arguments(pair, frames)))
         return self.own.get(pair.name, ())
 
     def link_angle(self, name: str) -> tuple[Array, ...]:
@@ -162,14 +157,13 @@ class DesignFrames:
         """The relative motion at a pair (steps + 1, designs), with its rates where these are there; an angle with the
         turns that `Motion.pair` tells it with."""
         pair = self.motions[name]
-        own = {name: self.own_coordinates(pair)}
-        value, *rates = _parts(
-            pair.input_position_at(self.shapes, {link: self.frame(link) for link in pair.bodies}, own)
-        )
+        frames = {link: self.frame(link) for link in pair.bodies}
+        position = pair.input_position_at(self.shapes, frames, {name: self.own_coordinates(pair)})
+        value, *rates = position.parts if isinstance(position, Jet) else (position,)
         if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.issuperset(pair.links):
-            meant = self.inputs[name][0] if name in self.inputs else np.zeros(value.shape[1:])
+            start = self.inputs[name][0] if name in self.inputs else np.zeros(value.shape[1:])
             # an angle of none of the inputs starts between -pi and pi, and one that does is left there
-            turns = np.round((meant - value[0]) / FULL_TURN)
+            turns = np.round((start - value[0]) / FULL_TURN)
             if name not in self.inputs:
                 turns = np.where(np.abs(value[0]) <= np.pi, 0.0, turns)
             value = value + FULL_TURN * turns
@@ -182,7 +176,7 @@ def _jet(*parts: Array) -> Jet | Array:
 
 
 def solve_own_coordinates(pair: Pair, frames: Sequence[Frame], numbers: Sequence[Scalar]) -> list[Scalar]:
-    """A pair's own coordinates where its links have these frames, of arrays or of jets of them.
+    """A pair's own coordinates, two at most, where its links have these frames, of arrays or of jets of them.
 
     They enter what it leaves open linearly, r + A x; of the rows that know no turns x is what leaves the least open.
     """
@@ -190,37 +184,25 @@ def solve_own_coordinates(pair: Pair, frames: Sequence[Frame], numbers: Sequence
     if not count:
         return []
     rows = _rows_without_turns(pair)
-    none = pair.residual(frames, numbers, (0.0,) * count)
-    units = [tuple(float(k == j) for j in range(count)) for k in range(count)]
-    columns = [[each - none[k] for k, each in enumerate(pair.residual(frames, numbers, unit))] for unit in units]
-    r = [_parts(none[k]) for k in rows]
-    a = [[_parts(column[k]) for column in columns] for k in rows]
-    orders = max(len(each) for each in r)
-    shape = np.broadcast_shapes(*(np.shape(each[0]) for each in r))
 
-    def order(parts: tuple[Scalar, ...], k: int) -> Array:
-        return np.broadcast_to(np.asarray(parts[k] if k < len(parts) else 0.0, dtype=float), shape)
+    def residual(*own: float) -> list[Scalar]:
+        every = pair.residual(frames, numbers, own)
+        return [every[row] for row in rows]
 
-    a_ = [np.stack([np.stack([order(e, k) for e in row], -1) for row in a], -2) for k in range(orders)]
-    r_ = [np.stack([order(e, k) for e in r], -1)[..., None] for k in range(orders)]
-    turned = np.swapaxes(a_[0], -1, -2)
-    inverse = _inverse(turned @ a_[0])
-    x: list[Array] = []
-    for k in range(orders):
-        left = r_[k] + sum(comb(k, j) * (a_[k - j] @ x[j]) for j in range(k))
-        x.append(-inverse @ (turned @ left))
-    return [_jet(*(each[..., j, 0] for each in x)) for j in range(count)]
+    r = residual(*[0.0] * count)
+    units = [[float(k == j) for j in range(count)] for k in range(count)]
+    columns = [[shifted - base for shifted, base in zip(residual(*unit), r, strict=True)] for unit in units]
+    sides = [-_dot(column, r) for column in columns]
+    normal = [[_dot(first, second) for second in columns] for first in columns]
+    if count == 1:
+        return [sides[0] / normal[0][0]]
+    (a, b), (_, d) = normal
+    determinant = a * d - b * b
+    return [(d * sides[0] - b * sides[1]) / determinant, (a * sides[1] - b * sides[0]) / determinant]
 
 
-def _parts(value: Scalar) -> tuple[Scalar, ...]:
-    return value.parts if isinstance(value, Jet) else (value,)
-
-
-def _inverse(square: Array) -> Array:
-    """The inverses of matrices (..., 1, 1) or (..., 2, 2) that are near the unit's."""
-    if square.shape[-1] == 1:
-        return 1.0 / square
-    return np.linalg.inv(square)
+def _dot(first: Sequence[Scalar], second: Sequence[Scalar]) -> Scalar:
+    return sum((a * b for a, b in zip(first, second, strict=True)), 0.0)
 
 
 def _rows_without_turns(pair: Pair) -> list[int]:
@@ -228,9 +210,9 @@ def _rows_without_turns(pair: Pair) -> list[int]:
     numbers = [0.3 + 0.1 * k for k in range(len(pair.number_kinds))]
     own = [0.7 + 0.2 * k for k in range(len(pair.coordinate_kinds))]
     frames = [frame_at(0.1 * k, 0.2 + 0.3 * k, 0.4 + 0.5 * k) for k in range(len(pair.bodies))]
-    before = pair.residual(frames, numbers, own)
-    same = np.ones(len(before), dtype=bool)
+    residual = pair.residual(frames, numbers, own)
+    same = np.ones(len(residual), dtype=bool)
     for k, frame in enumerate(frames):
         turned = [*frames[:k], frame_at(frame.x, frame.y, frame.angle + FULL_TURN), *frames[k + 1 :]]
-        same &= np.abs(np.subtract(pair.residual(turned, numbers, own), before)) < 1e-9
-    return [int(k) for k in np.flatnonzero(same)]
+        same &= np.abs(np.subtract(pair.residual(turned, numbers, own), residual)) < 1e-9
+    return np.flatnonzero(same).tolist()

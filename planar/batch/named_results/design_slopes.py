@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from planar.batch.named_results.result_rows import (
     LINK_QUANTITIES,
     PAIR_QUANTITIES,
     POINT_QUANTITIES,
+    NamedArrays,
     RequestedResults,
     derivative_name,
 )
@@ -46,24 +46,24 @@ class DesignSlopes:
         self.reference, self.results, self.orders = reference, results, 3 if rates else 1
         self.parameters = Parameters(reference.mechanism)
         names = list(self.parameters.names)
-        for each in results.derivatives:
-            if each not in names:
-                hint = suggest_name(each, names, "numbers")
-                raise BadInput("derivatives", f"nothing is derived in {each!r:.60}{hint}")
+        for number in results.derivatives:
+            if number not in names:
+                hint = suggest_name(number, names, "numbers")
+                raise BadInput("derivatives", f"nothing is derived in {number!r:.60}{hint}")
         self.directions = Directions(self.parameters, [names.index(number) for number in results.derivatives])
 
     @cached_property
     def is_bound(self) -> BoolArray:
         """The numbers that cannot change alone (numbers,)."""
         bound = tied_dimensions(self.reference.mechanism)
-        return np.array([each in bound for each in self.results.derivatives])
+        return np.array([number in bound for number in self.results.derivatives])
 
     @cached_property
     def free(self) -> SlopeResults:
         """The same in the numbers that can change alone, as machine code has it."""
-        numbers = [each for each, tied in zip(self.results.derivatives, self.is_bound, strict=True) if not tied]
-        of = self.results
-        return SlopeResults(of.derived_points, of.links, of.pairs, tuple(numbers), self.orders > 1)
+        results = self.results
+        numbers = tuple(np.array(results.derivatives, dtype=object)[~self.is_bound])
+        return SlopeResults(results.derived_points, results.links, results.pairs, numbers, self.orders > 1)
 
     def write_free(self, slopes: Array, out: Array) -> None:
         """Write rows of `free` (steps + 1, rows, designs) into those of all numbers."""
@@ -71,32 +71,34 @@ class DesignSlopes:
             out[:] = slopes
             return
         of_all = self.free._replace(numbers=self.results.derivatives)
-        for whole, part in zip(of_all.split_rows(out), self.free.split_rows(slopes), strict=True):
-            whole[:, :, self.is_bound] = np.nan
-            whole[:, :, ~self.is_bound] = part
+        for rows, free_rows in zip(of_all.split_rows(out), self.free.split_rows(slopes), strict=True):
+            rows[:, :, self.is_bound] = np.nan
+            rows[:, :, ~self.is_bound] = free_rows
 
-    def _results(self, motion: CoordinateMotion) -> Iterator[tuple[Scalar, ...]]:
-        """The parts of what is derived, in the order of `_quantities`."""
-        rates = range(self.orders)
-        for name in self.results.derived_points:
-            link, point = self.reference.point_member(name)
-            local = motion.shapes[link].position(point)
-            yield from (tuple(motion.place(link, local, rate)) for rate in rates)
-        for name in self.results.links:
-            yield from ((motion.angle_rates(name, rate),) for rate in rates)
-        for name in self.results.pairs:
-            yield from ((part,) for part in motion.input_position(motion.relative_motions[name]).parts)
+    def march_block(
+        self, block: DesignBlock, march: DesignBatch, done: SolvedDesigns
+    ) -> tuple[Array, BoolArray] | None:
+        """The slopes of a block, which has been solved and marched so, in the numbers that can change alone (steps + 1,
+        rows, designs), and the positions that are solved but have none yet (steps + 1, designs); None where machine
+        code does not do that."""
+        slopes = march_slopes(self.reference, march, self.free, block.designs)
+        if slopes is None:
+            return None
+        is_missing = np.zeros((len(slopes), slopes.shape[2]), dtype=bool)
+        # mostly all are numbers, and their sum is one
+        if done.status.any() or not np.isfinite(slopes.sum()):
+            is_solved = done.status.T == 0
+            is_missing = is_solved & ~np.isfinite(slopes).all(axis=1)
+            np.copyto(slopes, np.nan, where=~is_solved[:, None])
+        return slopes, is_missing
 
-    def find(self, frames: DesignFrames, values: Mapping[str, Array], is_solved: Array) -> dict[tuple[str, str], Array]:
-        """Derivatives (parts, steps + 1, designs) by quantity and name, of designs with `values` (designs,) by name.
+    def find(
+        self, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray, arrays: NamedArrays
+    ) -> None:
+        """Fill in the derivatives of designs with `values` (designs,) by name.
 
-        NaN where positions are not there or are singular, and in numbers that cannot change alone.
+        NaN stays where positions are not there or are singular, and in numbers that cannot change alone.
         """
-        derivatives = {
-            ("derivatives", derivative_name(what, number)): np.full((size, *frames.design_shape), np.nan)
-            for what, size in self._quantities()
-            for number in self.results.derivatives
-        }
         elements = constraint_elements(self.reference.mechanism)
         for positions in position_chunks(self.reference.mechanism, frames, values, is_solved):
             numbers = [value_at(positions.mechanism, number.address) for number in self.parameters.dimensions]
@@ -104,53 +106,29 @@ class DesignSlopes:
             kinematics = KinematicSlopes(self.parameters, coordinates, self.directions, numbers)
             is_unknown = kinematics.tied | self.is_bound | kinematics.is_singular[:, None]
             places = positions.steps, positions.designs
-            for (what, _), parts in zip(self._quantities(), self._results(kinematics.motion), strict=True):
+            for result, parts in self._results(kinematics.motion):
                 for axis, part in enumerate(parts):
                     slopes = np.where(is_unknown, np.nan, result_array(part, 1, is_unknown.shape))
                     for number, column in zip(self.results.derivatives, slopes.T, strict=True):
-                        derivatives["derivatives", derivative_name(what, number)][axis][places] = column
-        return derivatives
+                        arrays["derivatives", derivative_name(result, number)][axis][places] = column
 
-    def _quantities(self) -> Iterator[tuple[str, int]]:
-        """What is derived, as `position of E`, and how many parts it has."""
-        results = self.results
-        for names, quantities, size in (
-            (results.derived_points, POINT_QUANTITIES, 2),
-            (results.links, LINK_QUANTITIES, 1),
-            (results.pairs, PAIR_QUANTITIES, 1),
-        ):
-            for name in names:
-                for quantity in quantities[: self.orders]:
-                    yield f"{quantity} of {name}", size
+    def _results(self, motion: CoordinateMotion) -> Iterator[tuple[str, tuple[Scalar, ...]]]:
+        """What is derived, as `position of E`, with its parts."""
+        for name in self.results.derived_points:
+            link, point = self.reference.point_member(name)
+            local = motion.shapes[link].position(point)
+            for rate, quantity in enumerate(POINT_QUANTITIES[: self.orders]):
+                yield f"{quantity} of {name}", tuple(motion.place(link, local, rate))
+        for name in self.results.links:
+            for rate, quantity in enumerate(LINK_QUANTITIES[: self.orders]):
+                yield f"{quantity} of {name}", (motion.angle_rates(name, rate),)
+        for name in self.results.pairs:
+            positions = motion.input_position(motion.relative_motions[name]).parts
+            for quantity, part in zip(PAIR_QUANTITIES, positions, strict=False):
+                yield f"{quantity} of {name}", (part,)
 
 
 @lru_cache(maxsize=16)
 def design_slopes(reference: ReferenceDesign, results: RequestedResults, rates: bool) -> DesignSlopes:
     """The derivatives of a mechanism's designs, kept: a worker solves many blocks of one sweep."""
     return DesignSlopes(reference, results, rates)
-
-
-class MarchedBlock(NamedTuple):
-    """The slopes of a block's results in numbers that can change alone (steps + 1, rows, designs), and the positions
-    that are solved but have none yet (steps + 1, designs)."""
-
-    slopes: Array
-    missing: BoolArray
-
-
-def march_block_slopes(
-    slopes: DesignSlopes, block: DesignBlock, march: DesignBatch | None, done: SolvedDesigns
-) -> MarchedBlock | None:
-    """The slopes of a block that has been solved and marched so; None where machine code does not do that."""
-    if march is None:
-        return None
-    found = march_slopes(slopes.reference, march, slopes.free, block.designs)
-    if found is None:
-        return None
-    missing = np.zeros((len(found), found.shape[2]), dtype=bool)
-    # mostly all are numbers, and their sum is one
-    if done.status.any() or not np.isfinite(found.sum()):
-        is_solved = done.status.T == 0
-        missing = is_solved & ~np.isfinite(found).all(axis=1)
-        np.copyto(found, np.nan, where=~is_solved[:, None])
-    return MarchedBlock(found, missing)

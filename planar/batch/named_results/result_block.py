@@ -1,4 +1,4 @@
-"""Which results a sweep tells beside the points', and the rows in which they stand."""
+"""One block of a sweep: its points, over a range of one input or in time, and the results beside them."""
 
 from __future__ import annotations
 
@@ -7,27 +7,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, solve_design_block
-from planar.batch.design_arrays import split_into_blocks, values_of_design, with_design_values
-from planar.batch.general_path import link_angles
-from planar.batch.march.design_batch import DesignBatch
+from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, solve_design_block, status_code
+from planar.batch.design_arrays import design_variables, split_into_blocks, values_of_design, with_design_values
+from planar.batch.general_path import link_angles, solve_timed_design
+from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.prediction import LONGEST_STEP
-from planar.batch.named_results.design_forces import find_forces
+from planar.batch.march.runs import run_designs
+from planar.batch.named_results.design_forces import find_forces, output_link
 from planar.batch.named_results.design_frames import DesignFrames
-from planar.batch.named_results.design_slopes import MarchedBlock, design_slopes, march_block_slopes
-from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, RequestedResults
-from planar.batch.named_results.timed_block import input_motions, solve_timed_block
-from planar.batch.named_results.transmission_angles import output_link
+from planar.batch.named_results.design_slopes import design_slopes
+from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, NamedArrays, RequestedResults
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.llvm_compile import allocate_aligned
-from planar.foundation.arrays import BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Vector
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn
-from planar.model.link_shapes import LinkPlace
+from planar.model.link_shapes import LinkPlace, place_in_link
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-
-Array = np.ndarray
+from planar.solving.runs.time_run import input_law_rates
 
 LEAST_STROKE_STEPS = 24
 """Steps of a stroke between limits of its own, so that they show how links turn."""
@@ -50,7 +51,8 @@ def solve_result_block(block: ResultBlock, out: Array | None = None) -> SolvedDe
     """As `solve_design_block`; the rows of the results stand after those of the points."""
     if not any(block.results):
         if block.duration is not None:
-            return solve_timed_block(block.designs, block.duration)
+            with take_turn():
+                return _TimedBlockSolver(block.designs, block.duration).solve()
         return solve_design_block(block.designs, out)
     with take_turn():
         return _ResultBlockSolver(block).solve(out)
@@ -77,16 +79,15 @@ class _ResultBlockSolver:
     def _needed_links(self, by_places: bool) -> tuple[str, ...]:
         """The links whose axes are looked at: with those that tell how far they have turned."""
         frame, motions = self.mechanism.frame, self.reference.motions
+        moving = tuple(link.name for link in self.mechanism.links if link.name != frame)
         if self.results.outputs or self.results.has_forces or by_places:
-            found = [link.name for link in self.mechanism.links]
-        else:
-            found = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
-            if not found and self.marches_slopes:
-                return ()
-            if self.reference.counted_links.intersection(found):
-                found = [link.name for link in self.mechanism.links]
-        moving = [link.name for link in self.mechanism.links if link.name != frame]
-        return tuple(link for link in dict.fromkeys(found or moving[:1]) if link != frame)
+            return moving
+        links = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
+        if self.reference.counted_links.intersection(links):
+            return moving
+        if not links:
+            return () if self.marches_slopes else moving[:1]
+        return tuple(link for link in dict.fromkeys(links) if link != frame)
 
     def solve(self, out: Array | None) -> SolvedDesigns:
         """See `solve_result_block`."""
@@ -95,32 +96,37 @@ class _ResultBlockSolver:
         asked = block._replace(
             points=(*block.points, *places), rates=self.rates, steps=block.steps * refined, dtype="float64"
         )
-        done, march = self._solve_places(asked)
-        marched = None
+        march = marched = None
+        if self.duration is not None:
+            done = _TimedBlockSolver(asked, self.duration).solve()
+        else:
+            solver = DesignBlockSolver(asked, None)
+            done, march = solver.solve(), solver.march
         if self.slopes is not None and self.marches_slopes:
-            marched = march_block_slopes(self.slopes, asked, march, done)
-            if marched is None:
+            marched = None if march is None else self.slopes.march_block(asked, march, done)
+            if marched is None:  # machine code cannot do that
                 return _ResultBlockSolver(ResultBlock(block, self.results), False).solve(out)
-        orders, wide = 3 if self.rates else 1, 2 * len(asked.points)
-        whole = done.out.reshape(len(done.out), orders, wide, self.design_count)
-        points = 2 * len(block.points)
-        kept = 3 if block.rates else 1
+        orders, point_rows = 3 if block.rates else 1, 2 * len(block.points)
+        places_out = done.out.reshape(len(done.out), -1, 2 * len(asked.points), self.design_count)
         if out is None:
-            count = kept * points + sum(row.width for row in self.rows)
+            count = orders * point_rows + sum(row.width for row in self.rows)
             out = allocate_aligned(block.steps + 1, count, self.design_count, block.dtype)
-        out[:, : kept * points].reshape(len(out), kept, points, self.design_count)[:] = whole[::refined, :kept, :points]
+        points_out = out[:, : orders * point_rows].reshape(len(out), orders, point_rows, self.design_count)
+        points_out[:] = places_out[::refined, :orders, :point_rows]
         looked_up = 0
         parts = split_into_blocks(self.design_count, max(1, MAX_PART_POSITIONS // len(done.out)))
         for part in parts if self.links else ():
-            own = _DesignPart(block, done, part)
-            frames = self._frames(own, np.moveaxis(whole[:, :, points:, part], 1, 0))
-            unclear = np.flatnonzero(~frames.is_clear & (own.status[:, 0] == 0))
+            inputs = done.input if done.input.ndim == 1 else done.input[part]
+            solved = _SolvedPart(part, _select_designs(block, part), done.status[part], inputs)
+            frames = self._frames(solved, np.moveaxis(places_out[:, :, point_rows:, part], 1, 0))
+            unclear = np.flatnonzero(~frames.is_clear & (solved.status[:, 0] == 0))
             if unclear.size:
-                self._look_up_angles(frames, own, unclear)
+                self._look_up_angles(frames, solved, unclear)
                 looked_up += int(unclear.size)
-            self._write_results(frames, own, out[:, kept * points :, part], refined)
+            self._write_results(frames, solved, out[:, orders * point_rows :, part], refined)
         if marched is not None:
-            self._write_marched(marched, out, refined)
+            slopes, is_missing = marched
+            self._write_marched(slopes[::refined], is_missing[::refined], out)
         return done._replace(
             out=out,
             status=done.status[:, ::refined],
@@ -129,36 +135,28 @@ class _ResultBlockSolver:
             general_designs=done.general_designs + looked_up,
         )
 
-    def _solve_places(self, asked: DesignBlock) -> tuple[SolvedDesigns, DesignBatch | None]:
-        """The points and places that are asked for, and how compiled code marched to them."""
-        if self.duration is not None:
-            return solve_timed_block(asked, self.duration), None
-        solver = DesignBlockSolver(asked, None)
-        return solver.solve(), solver.march
-
-    def _write_marched(self, marched: MarchedBlock, out: Array, refined: int) -> None:
+    def _write_marched(self, slopes: Array, is_missing: BoolArray, out: Array) -> None:
         """Write the derivatives into the last rows of out: those that machine code tells, and what it leaves open."""
         assert self.slopes is not None
         count = sum(row.width for row in self.rows if row.quantity == "derivatives")
-        own, missing = out[:, out.shape[1] - count :], marched.missing[::refined]
-        self.slopes.write_free(marched.slopes[::refined], own)
-        some = np.flatnonzero(missing.any(axis=0))
-        if some.size:
-            block = self.block
-            designs = {name: np.asarray(value)[some] for name, value in block.designs.items()}
-            z = None if block.assemblies is None else block.assemblies[:, some]
-            part = block._replace(designs=designs, assemblies=z, points=())
-            of = self.results._replace(outputs=(), efforts=(), reactions=())
-            found = solve_result_block(ResultBlock(part, of, None, missing[:, some])).out
-            at = missing[:, None, some]
-            own[:, :, some] = np.where(at, found[:, found.shape[1] - count :], own[:, :, some])
+        slope_rows = out[:, out.shape[1] - count :]
+        self.slopes.write_free(slopes, slope_rows)
+        designs = np.flatnonzero(is_missing.any(axis=0))
+        if designs.size:
+            block = _select_designs(self.block, designs)._replace(points=())
+            results = self.results._replace(outputs=(), efforts=(), reactions=())
+            others = solve_result_block(ResultBlock(block, results, None, is_missing[:, designs])).out
+            known = slope_rows[:, :, designs]
+            slope_rows[:, :, designs] = np.where(
+                is_missing[:, None, designs], others[:, others.shape[1] - count :], known
+            )
 
     def _refinement(self) -> int:
         """Into how many a step is divided, so that it shows how far links turn."""
         block, base_ = self.block, self.reference
         if self.duration is not None:
             time = np.linspace(0.0, self.duration, block.steps + 1)
-            timed = input_motions(self.mechanism, dict(block.designs), time)[0]
+            timed = input_motions(self.mechanism, block, time)[0]
             moved = np.abs(np.diff(timed, axis=1)) / base_.input_scale[:, None, None]
             return max(1, ceil(float(np.max(moved)) / LONGEST_STEP - 1e-9))
         if base_.is_sliding and block.stop is None:
@@ -169,44 +167,41 @@ class _ResultBlockSolver:
         length = FULL_TURN if block.stop is None else block.stop / scale - start
         return max(1, ceil(float(np.max(np.abs(length))) / block.steps / LONGEST_STEP - 1e-9))
 
-    def _frames(self, part: _DesignPart, rows: Array) -> DesignFrames:
+    def _frames(self, part: _SolvedPart, rows: Array) -> DesignFrames:
         """Frames of the links out of rows (orders, steps + 1, rows, designs) of places."""
         base_, shape = self.reference, (rows.shape[1], rows.shape[3])
-        designs = with_design_values(self.mechanism, part.designs)
+        designs = with_design_values(self.mechanism, part.block.designs)
         if self.duration is not None:
-            timed = input_motions(self.mechanism, part.designs, part.input)[0]
-            inputs = {given.pair: each for given, each in zip(designs.inputs, timed, strict=True)}
+            timed = input_motions(self.mechanism, part.block, part.input)[0]
+            inputs = {driven.pair: position for driven, position in zip(designs.inputs, timed, strict=True)}
         else:
             running = np.broadcast_to(part.input, shape[::-1]).T
             inputs = {
-                given.pair: running
-                if given.pair == base_.pair
-                else np.broadcast_to(np.asarray(given.position, dtype=float), shape)
-                for given in designs.inputs
+                driven.pair: running
+                if driven.pair == base_.pair
+                else np.broadcast_to(np.asarray(driven.position, dtype=float), shape)
+                for driven in designs.inputs
             }
         places = {
             link: (rows[:, :, 4 * k : 4 * k + 2], rows[:, :, 4 * k + 2 : 4 * k + 4])
             for k, link in enumerate(self.links)
         }
-        found = DesignFrames(designs, base_.design_rows(part.designs, shape[1]).shapes, inputs, places, self.arm)
-        found.time = None if self.duration is None else part.input
-        return found
+        time = None if self.duration is None else part.input
+        shapes = base_.design_rows(part.block.designs, shape[1]).shapes
+        return DesignFrames(designs, shapes, inputs, places, self.arm, time)
 
-    def _look_up_angles(self, frames: DesignFrames, part: _DesignPart, designs: Array) -> None:
+    def _look_up_angles(self, frames: DesignFrames, part: _SolvedPart, designs: IntArray) -> None:
         """Take the angles of designs whose steps do not show them from their cycles."""
         steps = frames.design_shape[0] - 1
-        found = np.full((len(self.links), steps + 1, designs.size), np.nan)
+        angles = np.full((len(self.links), steps + 1, designs.size), np.nan)
         for k, index in enumerate(designs):
-            many = int(np.argmax(part.status[index] != 0)) if part.status[index].any() else steps + 1
-            found[:, :many, k] = link_angles(self._motion(part, int(index), steps), self.links)[:, :many]
-        frames.replace_angles(designs, dict(zip(self.links, found, strict=True)))
+            count = int(np.argmax(part.status[index] != 0)) if part.status[index].any() else steps + 1
+            angles[:, :count, k] = link_angles(self._motion(part, int(index), steps), self.links)[:, :count]
+        frames.replace_angles(designs, dict(zip(self.links, angles, strict=True)))
 
-    def _motion(self, part: _DesignPart, index: int, steps: int) -> Motion:
+    def _motion(self, part: _SolvedPart, index: int, steps: int) -> Motion:
         """The motion of one design, by itself."""
-        mechanism = with_design_values(self.mechanism, values_of_design(part.designs, index))
-        if part.assemblies is not None:
-            rows = self.reference.design_rows(part.designs, len(part.status))
-            mechanism = self.reference.with_sketch_of(mechanism, part.assemblies[:, index], rows.u[:, index])
+        mechanism = _single_design(self.reference, part.block, index)
         if self.duration is not None:
             return cycle(mechanism, steps, duration=self.duration)
         if self.reference.is_sliding and self.block.stop is None:
@@ -214,47 +209,155 @@ class _ResultBlockSolver:
         grid = part.input if part.input.ndim == 1 else part.input[index]
         return cycle(mechanism, steps, float(grid[0]), float(grid[-1]), self.reference.pair)
 
-    def _write_results(self, frames: DesignFrames, part: _DesignPart, out: Array, refined: int) -> None:
-        """Write the results into rows of out (steps + 1, rows, designs)."""
-        found: dict[tuple[str, str], Array] = {}
+    def _write_results(self, frames: DesignFrames, part: _SolvedPart, out: Array, refined: int) -> None:
+        """Write the results into rows of out (steps + 1, rows, designs); derivatives that are marched stand last."""
+        rows = [row for row in self.rows if row.quantity != "derivatives" or not self.marches_slopes]
+        arrays: NamedArrays = {
+            (row.quantity, row.name): np.full((row.width, *frames.design_shape), np.nan)
+            for row in rows
+            if row.quantity not in (*LINK_QUANTITIES, *PAIR_QUANTITIES)
+        }
         for name in self.results.links:
-            found |= {
-                (word, name): each[None] for word, each in zip(LINK_QUANTITIES, frames.link_angle(name), strict=False)
-            }
+            for quantity, rate in zip(LINK_QUANTITIES, frames.link_angle(name), strict=False):
+                arrays[quantity, name] = rate[None]
         for name in self.results.pairs:
-            found |= {
-                (word, name): each[None] for word, each in zip(PAIR_QUANTITIES, frames.pair_value(name), strict=False)
-            }
-        is_solved = part.status.T == 0
+            for quantity, rate in zip(PAIR_QUANTITIES, frames.pair_value(name), strict=False):
+                arrays[quantity, name] = rate[None]
+        is_solved, values = part.status.T == 0, part.block.designs
         if self.results.has_forces:
-            found |= find_forces(self.mechanism, self.results, frames, part.designs, is_solved)
+            find_forces(self.mechanism, self.results, frames, values, is_solved, arrays)
         for name in self.results.outputs:
-            angles = output_link(self.mechanism, name).angles(frames, part.designs, is_solved)
-            found["transmission_angle", name] = angles[None]
+            arrays["transmission_angle", name][0] = output_link(self.mechanism, name).angles(frames, values, is_solved)
         if self.slopes is not None and not self.marches_slopes:
-            wanted = is_solved & self._slope_positions(part.which, refined)
-            found |= self.slopes.find(frames, part.designs, wanted)
-        at = 0
-        for row in self.rows:
-            if row.quantity == "derivatives" and self.marches_slopes:
-                break  # which stand last
-            whole = np.broadcast_to(found[row.quantity, row.name], (row.width, *frames.design_shape))
-            out[:, at : at + row.width] = np.moveaxis(whole, 0, 1)[::refined]
-            at += row.width
+            is_asked = is_solved & self._slope_positions(part.which, refined)
+            self.slopes.find(frames, values, is_asked, arrays)
+        first = 0
+        for row in rows:
+            array = np.broadcast_to(arrays[row.quantity, row.name], (row.width, *frames.design_shape))
+            out[:, first : first + row.width] = np.moveaxis(array, 0, 1)[::refined]
+            first += row.width
 
     def _slope_positions(self, designs: slice, refined: int) -> BoolArray:
         """Where derivatives are wanted (steps + 1, designs): not between the positions that are told."""
-        found = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
-        found[::refined] = True if self.slopes_at is None else self.slopes_at
-        return found[:, designs]
+        is_wanted = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
+        is_wanted[::refined] = True if self.slopes_at is None else self.slopes_at
+        return is_wanted[:, designs]
 
 
-class _DesignPart:
-    """Some designs of a block that has been solved: their numbers, statuses and inputs."""
+class _SolvedPart(NamedTuple):
+    """Some designs of a block that has been solved: which, and their numbers, statuses and inputs."""
 
-    def __init__(self, block: DesignBlock, done: SolvedDesigns, part: slice):
-        self.which = part
-        self.designs = {name: np.asarray(value)[part] for name, value in block.designs.items()}
-        self.assemblies = None if block.assemblies is None else block.assemblies[:, part]
-        self.status = done.status[part]
-        self.input = done.input if done.input.ndim == 1 else done.input[part]
+    which: slice
+    block: DesignBlock
+    status: Array
+    input: Array
+
+
+def _select_designs(block: DesignBlock, which: slice | IntArray) -> DesignBlock:
+    """Some designs of a block."""
+    designs = {name: np.asarray(value)[which] for name, value in block.designs.items()}
+    return block._replace(designs=designs, assemblies=None if block.assemblies is None else block.assemblies[:, which])
+
+
+def _single_design(reference: ReferenceDesign, block: DesignBlock, index: int) -> Mechanism:
+    """One design of a block, with a sketch of its assembly where that is given."""
+    design = with_design_values(reference.mechanism, values_of_design(block.designs, index))
+    if block.assemblies is None:
+        return design
+    u = reference.design_rows(block.designs, block.assemblies.shape[1]).u[:, index]
+    return reference.with_sketch_of(design, block.assemblies[:, index], u)
+
+
+def input_motions(mechanism: Mechanism, block: DesignBlock, time: Array) -> Array:
+    """Positions, first and second rates of the inputs (3, inputs, steps + 1, designs) of designs at times (steps + 1,)
+    (SI)."""
+    count = len(next(iter(block.designs.values())))
+    variables = design_variables(mechanism)
+    of_inputs = {name: value for name, value in block.designs.items() if variables[name].path[0] == "inputs"}
+    designs = [
+        with_design_values(mechanism, values_of_design(of_inputs, index)) for index in range(count if of_inputs else 1)
+    ]
+    rates = np.array([[input_law_rates(driven, time)[:3] for driven in design.inputs] for design in designs])
+    rates = rates.transpose(2, 1, 3, 0)
+    return np.broadcast_to(rates, (*rates.shape[:3], count))
+
+
+class _TimedBlockSolver:
+    """Solves a block in time (s); `input` are the times (steps + 1,).
+
+    Designs whose inputs move alike go side by side where only positions are wanted, or where all inputs keep their
+    speed; all others, and those that come to a dead point, by the general path.
+    """
+
+    def __init__(self, block: DesignBlock, duration: float):
+        self.block, self.duration = block, duration
+        self.reference: ReferenceDesign = reference_design(block.mechanism, None, True)
+        self.design_count = len(next(iter(block.designs.values())))
+        self.time = np.linspace(0.0, duration, block.steps + 1)
+
+    def solve(self) -> SolvedDesigns:
+        """See `solve_design_block`."""
+        block, count = self.block, self.design_count
+        orders = 3 if block.rates else 1
+        out = allocate_aligned(block.steps + 1, 2 * len(block.points) * orders, count, block.dtype)
+        status = np.zeros((count, block.steps + 1), dtype=np.int8)
+        solved_steps = self._run_compiled(out.reshape(len(out), orders, len(block.points), 2, count))
+        general_positions, endings = 0, dict[int, tuple[int, str | NoAnswer]]()
+        others = np.flatnonzero(solved_steps <= block.steps).tolist()
+        for index in others:
+            mechanism = _single_design(self.reference, block, index)
+            solved = solve_timed_design(mechanism, self.duration, block.steps, block.points, block.rates)
+            out[:, :, index], status[index] = solved.out, solved.status
+            general_positions += int(np.sum(solved.status == 0))
+            sentences = (int(solved.status[-1]), solved.message), (status_code(Outcome.SOLVED), solved.rate_remark)
+            for code, sentence in sentences:
+                if sentence:
+                    number, first = endings.get(code, (0, sentence))
+                    endings[code] = number + 1, first
+        ends = tuple((code, *ending) for code, ending in endings.items())
+        unknown = np.full((2, count), np.nan)
+        return SolvedDesigns(out, status, self.time, general_positions, len(others), ends, *unknown)
+
+    def _run_compiled(self, out: Array) -> IntArray:
+        """Fill out (steps + 1, orders, points, 2, designs) as far as it runs compiled; how many steps passed
+        (designs,)."""
+        base_, block = self.reference, self.block
+        solved_steps: IntArray = np.zeros(self.design_count, dtype=int)
+        if not base_.can_be_compiled or base_.mechanism.stops:
+            return solved_steps
+        design_rows = base_.design_rows(block.designs, self.design_count)
+        p, shapes = design_rows.p, design_rows.shapes
+        u, u1, u2 = input_motions(base_.mechanism, block, self.time) / base_.input_scale[:, None, None]
+        if block.assemblies is None:
+            start = find_assemblies(base_, shapes, p, design_rows.u)
+        else:
+            start = given_assemblies(block.assemblies)
+        fit = start.is_sure & design_rows.is_fit & ~base_.is_unfit(block.designs, shapes)
+        fit &= np.abs(u).max(axis=(0, 1)) <= LARGEST_INPUT_POSITION
+        if block.rates:
+            fit &= np.all((np.ptp(u1, axis=1) == 0.0) & np.all(u2 == 0.0, axis=1), axis=0)
+        members = [base_.point_member(name) for name in block.points]
+        moving = [k for k, (link, _) in enumerate(members) if link != base_.mechanism.frame]
+        inputs = u[:, 0], u1[:, 0], u2[:, 0]
+        march = base_.design_batch(shapes, p, inputs, [members[k] for k in moving], block.rates)._replace(z0=start.z)
+        offsets = (u - u[:, :1]).transpose(1, 0, 2)  # (steps + 1, inputs, designs)
+        which = np.flatnonzero(fit)
+        if not which.size:
+            return solved_steps
+        courses = np.unique(offsets[:, :, which].reshape(-1, which.size), axis=1, return_inverse=True)[1].ravel()
+        rows = allocate_aligned(len(out), march.output_row_count, self.design_count)
+        try:
+            for course in range(int(courses.max()) + 1):
+                alike = which[courses == course]
+                part = march.select(alike)._replace(input_offsets=np.ascontiguousarray(offsets[:, :, alike[0]]))
+                part_rows = allocate_aligned(len(out), march.output_row_count, alike.size)
+                solved_steps[alike] = run_designs(part, part_rows)
+                rows[:, :, alike] = part_rows
+        except UnsupportedOperation:
+            return np.zeros_like(solved_steps)
+        out[:] = 0.0
+        out[:, :, moving] = rows.reshape(len(out), out.shape[1], len(moving), 2, self.design_count)
+        for k, (link, point) in enumerate(members):
+            if k not in moving:
+                out[:, 0, k, 0], out[:, 0, k, 1] = place_in_link(shapes[link], point)
+        return solved_steps

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -13,6 +14,8 @@ POINT_QUANTITIES = ("position", "velocity", "acceleration")
 LINK_QUANTITIES = ("angle", "angular_velocity", "angular_acceleration")
 PAIR_QUANTITIES = ("value", "value_rate", "value_second_rate")
 RATE_UNITS = ("", "/s", "/s^2")
+NamedArrays: TypeAlias = dict[tuple[str, str], Array]
+"""Results (numbers, steps + 1, designs) by quantity and name."""
 
 
 class ResultRow(NamedTuple):
@@ -84,8 +87,8 @@ def derivative_name(what: str, number: str) -> str:
 def select_names(place: str, given: Sequence[str] | str, known: Sequence[str]) -> tuple[str, ...]:
     """Names that are asked for, each once. Raises BadInput for one that is not known."""
     asked = [given] if isinstance(given, str) else list(given)
-    for each in asked:
-        if each not in known:
-            hint = suggest_name(str(each), known, "names here")
-            raise BadInput(place, f"there is nothing of the name {each!r:.60} here{hint}")
+    for name in asked:
+        if name not in known:
+            hint = suggest_name(str(name), known, "names here")
+            raise BadInput(place, f"there is nothing of the name {name!r:.60} here{hint}")
     return tuple(dict.fromkeys(asked))

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.mechanisms.results import Each
+from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES
 from planar.batch.results import Sweep
-
-Array = np.ndarray
+from planar.foundation.arrays import Array, BoolArray, ComplexArray
 
 HARMONICS = 8
 """Harmonics of a path of which there are descriptors."""
@@ -27,8 +27,8 @@ def extremes(values: Array) -> Array:
 def path_length(path: Array) -> Array:
     """The length (designs,) of the polygon through the positions of paths (designs, steps + 1, 2)."""
     step = np.diff(path, axis=1)
-    found: Array = np.hypot(step[..., 0], step[..., 1]).sum(axis=1)
-    return found
+    length: Array = np.hypot(step[..., 0], step[..., 1]).sum(axis=1)
+    return length
 
 
 def enclosed_area(path: Array) -> Array:
@@ -39,11 +39,11 @@ def enclosed_area(path: Array) -> Array:
     c = _fourier_coefficients(path)
     n = np.fft.fftfreq(c.shape[1], 1.0 / c.shape[1])
     n[2 * np.abs(n) == c.shape[1]] = 0.0
-    found: Array = np.pi * np.sum(n * (c.real**2 + c.imag**2), axis=1)
-    return found
+    area: Array = np.pi * np.sum(n * (c.real**2 + c.imag**2), axis=1)
+    return area
 
 
-def fourier_descriptors(path: Array, harmonics: int = HARMONICS) -> Array:
+def fourier_descriptors(path: Array, harmonics: int = HARMONICS) -> ComplexArray:
     """Normalised Fourier descriptors (designs, 2 harmonics) of closed paths (designs, steps + 1, 2): complex numbers.
 
     Those of n = 1, -1, 2, -2, ... in x + iy = sum of c_n exp(i n theta), theta going on evenly from step to step, so
@@ -64,21 +64,22 @@ def fourier_descriptors(path: Array, harmonics: int = HARMONICS) -> Array:
         ahead, back = ahead * begin ** (n - 1), back * begin ** (-n - 1)
         other = (ahead[:, 1:2].real < 0.0) if harmonics > 1 else np.zeros((len(c), 1), dtype=bool)
         ahead, back = np.where(other, ahead * (-1.0) ** (n - 1), ahead), np.where(other, back * (-1.0) ** (n + 1), back)
-        found: Array = np.stack([ahead, back], axis=2).reshape(len(c), -1) / (1.0 + back[:, :1])
-    return found
+        return np.stack([ahead, back], axis=2).reshape(len(c), -1) / (1.0 + back[:, :1])
 
 
-def _fourier_coefficients(path: Array) -> Array:
+def _fourier_coefficients(path: Array) -> ComplexArray:
     """c_n (designs, steps) of x + iy at positions equally spaced, the last of which is the first again."""
     z = path[:, :-1, 0] + 1j * path[:, :-1, 1]
     return np.fft.fft(z, axis=1) / z.shape[1]
 
 
 class _Measure(NamedTuple):
-    """Of a point: `measure` of what a sweep has of it, `order`, (designs, steps + 1, 2); `of_whole_path`: whether only
-    of paths that are solved at every step, `of_closed_path`: and that come back to their start."""
+    """Of a point: a `function` of what a sweep has of it, `order`, (designs, steps + 1, 2).
 
-    measure: Callable[[Array], Array]
+    `of_whole_path`: only of paths that are solved at every step; `of_closed_path`: and that come back to their start.
+    """
+
+    function: Callable[[Array], Any]
     order: str = "position"
     of_whole_path: bool = False
     of_closed_path: bool = False
@@ -119,47 +120,36 @@ class PointReduction:
 
     def __call__(self, sweep: Sweep | Each) -> Array:
         """The measure of every design; not a number where the path is not as the measure wants it."""
-        wanted = MEASURES[self.measure]
+        measure = MEASURES[self.measure]
         if isinstance(sweep, Each):
-            values = sweep.of_point(wanted.order, self.point)
+            values = sweep.of_point(measure.order, self.point)
         else:
-            of_points: Mapping[str, Any] = getattr(sweep, wanted.order)
-            values = np.asarray(of_points[self.point])
-        found = wanted.measure(values)
-        if wanted.of_whole_path:
-            found[~sweep.whole] = np.nan
-        if wanted.of_closed_path:
-            found[~_is_closed(values)] = np.nan
-        return found
+            points: Mapping[str, Any] = getattr(sweep, measure.order)
+            values = np.asarray(points[self.point])
+        measured = measure.function(values)
+        if measure.of_whole_path:
+            measured[~sweep.whole] = np.nan
+        if measure.of_closed_path:
+            measured[~_is_closed(values)] = np.nan
+        return measured
 
 
-def _is_closed(path: Array) -> Array:
+def _is_closed(path: Array) -> BoolArray:
     """Which paths (designs, steps + 1, 2) come back to where they started (designs,)."""
     extent = np.ptp(path, axis=1).max(axis=1)
-    found: Array = np.abs(path[:, -1] - path[:, 0]).max(axis=1) <= CLOSED_PATH_TOLERANCE * extent
-    return found
+    return np.asarray(np.abs(path[:, -1] - path[:, 0]).max(axis=1) <= CLOSED_PATH_TOLERANCE * extent)
 
 
-class ResultMeasure(NamedTuple):
-    """A result beside those of points: which argument of a sweep asks for it, and of which order in time it is."""
-
-    asked_by: str
-    order: int = 0
-
-
-RESULTS: Mapping[str, ResultMeasure] = {
-    "angle": ResultMeasure("links"),
-    "angular_velocity": ResultMeasure("links", 1),
-    "angular_acceleration": ResultMeasure("links", 2),
-    "value": ResultMeasure("pairs"),
-    "value_rate": ResultMeasure("pairs", 1),
-    "value_second_rate": ResultMeasure("pairs", 2),
-    "transmission_angle": ResultMeasure("outputs"),
-    "effort": ResultMeasure("efforts"),
-    "reaction": ResultMeasure("reactions"),
-    "reaction_couple": ResultMeasure("reactions"),
+RESULTS: Mapping[str, str] = {
+    **dict.fromkeys(LINK_QUANTITIES, "links"),
+    **dict.fromkeys(PAIR_QUANTITIES, "pairs"),
+    "transmission_angle": "outputs",
+    "effort": "efforts",
+    "reaction": "reactions",
+    "reaction_couple": "reactions",
 }
-"""Results of links, pairs and inputs whose extremes are told by name: those attributes of a `Sweep`."""
+"""Results of links, pairs and inputs whose extremes are told by name, those attributes of a `Sweep`: which argument of
+a sweep asks for each."""
 EXTREMES_ENDING = "_extremes"
 
 
@@ -173,10 +163,10 @@ class ResultReduction:
     @property
     def wants_rates(self) -> bool:
         """Whether it is a rate."""
-        return RESULTS[self.quantity].order > 0
+        return self.quantity in (*LINK_QUANTITIES[1:], *PAIR_QUANTITIES[1:])
 
     def __call__(self, sweep: Sweep) -> Array:
         """The least and the greatest of every design (designs, 2)."""
-        found: Mapping[str, Any] = getattr(sweep, self.quantity)
-        values = np.asarray(found[self.name])
-        return extremes(values if values.ndim == 2 else np.hypot(values[..., 0], values[..., 1]))
+        results: Mapping[str, Any] = getattr(sweep, self.quantity)
+        values = np.asarray(results[self.name])
+        return extremes(values) if values.ndim == 2 else _magnitude_extremes(values)

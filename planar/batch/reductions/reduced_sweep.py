@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from operator import length_hint
@@ -28,14 +28,14 @@ from planar.batch.reductions.point_reductions import (
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import INTERRUPTED, BlockStore, MemoryStore, SweepPlan
 from planar.document.first_argument import MechanismSource
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.short_repr import short_repr
 from planar.foundation.time_limit import interrupted, time_is_over
 from planar.model.mechanism import Mechanism
 from planar.model.pin_linkages import PinnedLinkages
 
-Array = np.ndarray
-Swept_ = TypeVar("Swept_")
+Swept_ = TypeVar("Swept_", bound=Sized)
 Reduction = Callable[[Swept_], Any]
 """What is made of some of the whole, a `Sweep` or an `Each`: an array with an entry first for each of its designs."""
 RESULT_TYPES = ("float64", "float32")
@@ -80,10 +80,9 @@ class ReducedSweep(Mapping[str, Array]):
         return len(self.reduced)
 
     @property
-    def whole(self) -> Array:
+    def whole(self) -> BoolArray:
         """The designs (designs,) that were solved at every step."""
-        found: Array = self.status == 0
-        return found
+        return np.asarray(self.status == 0)
 
 
 class ReducedBlock(NamedTuple):
@@ -105,27 +104,27 @@ class Reductions(NamedTuple):
     @property
     def measures(self) -> list[PointReduction | ResultReduction]:
         """Those that are asked for by name."""
-        return [each for each in self.functions.values() if isinstance(each, PointReduction | ResultReduction)]
+        functions = self.functions.values()
+        return [function for function in functions if isinstance(function, PointReduction | ResultReduction)]
 
     def with_results(self, asked: Mapping[str, Sequence[str] | str]) -> dict[str, tuple[str, ...]]:
         """The names of links, pairs and so on that are asked for, with those of measures."""
-        found = {word: (names,) if isinstance(names, str) else tuple(names) for word, names in asked.items()}
-        for each in self.measures:
-            if isinstance(each, ResultReduction):
-                word = RESULTS[each.quantity].asked_by
-                found[word] = (*found[word], each.name)
-        return found
+        names = {word: (given,) if isinstance(given, str) else tuple(given) for word, given in asked.items()}
+        for measure in self.measures:
+            if isinstance(measure, ResultReduction):
+                names[RESULTS[measure.quantity]] += (measure.name,)
+        return names
 
     def with_points(self, points: Sequence[Any] | None, rates: bool) -> tuple[tuple[Any, ...] | None, bool]:
         """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
         only measures are. Raises BadInput."""
-        own = tuple(dict.fromkeys(each.point for each in self.measures if isinstance(each, PointReduction)))
-        wants_rates = any(each.wants_rates for each in self.measures)
+        measured = dict.fromkeys(measure.point for measure in self.measures if isinstance(measure, PointReduction))
+        wants_rates = any(measure.wants_rates for measure in self.measures)
         if len(self.measures) == len(self.functions):
-            return own, wants_rates
+            return tuple(measured), wants_rates
         if wants_rates and not rates:
             raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
-        return None if points is None else tuple(dict.fromkeys((*points, *own))), rates
+        return None if points is None else tuple(dict.fromkeys((*points, *measured))), rates
 
 
 def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any], steps: int) -> Reductions:
@@ -135,25 +134,22 @@ def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any]
     return Reductions({name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()})
 
 
-def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Reduction[Any]:
+def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Any:
     if isinstance(given, str):
         point, _, measure = given.rpartition(".")
         if measure.removesuffix(EXTREMES_ENDING) in RESULTS and measure not in MEASURES:
-            told: Reduction[Any] = ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
-            return told
+            return ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
         if measure not in MEASURES:
             known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
             hint = suggest_name(measure, known, "measures", None)
             raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{hint}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
-        measured: Reduction[Any] = PointReduction(result_name(point), measure)
-        return measured
+        return PointReduction(result_name(point), measure)
     if not callable(given):
         wanted = "a measure, as 'C.bounding_box', or a function of a sweep"
         raise BadInput(f"reduce.{name}", f"{wanted} is wanted, not {given!r:.40}")
-    function: Reduction[Any] = given
-    return function
+    return given
 
 
 def result_type(dtype: DTypeLike) -> str:
@@ -182,19 +178,31 @@ def reduce_block(block: ResultBlock, reductions: Mapping[str, Reduction[Sweep]])
     return ReducedBlock(reduced, ended, done.general_positions, done.general_designs, done.endings)
 
 
-def reduce_all(found: Swept_, reductions: Mapping[str, Reduction[Swept_]], dtype: str) -> dict[str, Array]:
+def reduce_all(source: Swept_, reductions: Mapping[str, Reduction[Swept_]], dtype: str) -> dict[str, Array]:
     """The reductions of some of the whole, rounded. Raises BadInput where one has no entry for each design."""
-    return {name: _reduce(name, function, found, dtype) for name, function in reductions.items()}
+    reduced = {}
+    for name, function in reductions.items():
+        values = np.asarray(function(source))
+        if values.dtype == object or values.shape[:1] != (len(source),):
+            told = f"a reduction gives an array with an entry for each of {len(source)} designs, not one {values.shape}"
+            raise BadInput(f"reduce.{name}", told)
+        if dtype != "float64" and values.dtype.kind in "fc":
+            values = values.astype("complex64" if values.dtype.kind == "c" else dtype)
+        reduced[name] = values
+    return reduced
 
 
-def _reduce(name: str, function: Reduction[Any], some: Any, dtype: str) -> Array:
-    found = np.asarray(function(some))
-    if found.dtype == object or found.shape[:1] != (len(some),):
-        told = f"a reduction gives an array with an entry for each of {len(some)} designs, not one {found.shape}"
-        raise BadInput(f"reduce.{name}", told)
-    if dtype != "float64" and found.dtype.kind in "fc":
-        return found.astype("complex64" if found.dtype.kind == "c" else dtype)
-    return found
+def join_blocks(blocks: Sequence[ReducedBlock]) -> tuple[dict[str, Array], Array, int]:
+    """The reductions of all blocks, one after the other, which are no longer theirs; how all designs ended, and how
+    many positions the general path solved. Raises BadInput where they are not of one shape."""
+    reduced = {}
+    for name in tuple(blocks[0].reduced) if blocks else ():
+        shapes = {block.reduced[name].shape[1:] for block in blocks}
+        if len(shapes) > 1:
+            raise BadInput(f"reduce.{name}", f"some mechanisms have an array {min(shapes)} each, others {max(shapes)}")
+        reduced[name] = np.concatenate([block.reduced.pop(name) for block in blocks])
+    status = np.concatenate([np.zeros(0, dtype=np.int8), *(block.status for block in blocks)])
+    return reduced, status, sum(block.general_positions for block in blocks)
 
 
 class ReductionStore(BlockStore):
@@ -202,44 +210,38 @@ class ReductionStore(BlockStore):
 
     def __init__(self, plan: SweepPlan):
         super().__init__(plan)
-        self.reduced: dict[str, Array] = {}
-        self.status = np.zeros(plan.design_count, dtype=np.int8)
+        self.blocks: dict[int, ReducedBlock] = {}
 
     def write_block(self, number: int, part: slice, done: SolvedDesigns | ReducedBlock) -> None:
         assert isinstance(done, ReducedBlock)
+        first = next(iter(self.blocks.values()), done)
         for name, values in done.reduced.items():
-            whole, own = self.reduced.get(name), values.shape[1:]
-            if whole is None:
-                whole = np.empty((self.plan.design_count, *own), values.dtype)
-            if whole.shape[1:] != own:
-                told = f"designs {part.start} to {part.stop - 1} have an array {own} each, others {whole.shape[1:]}"
-                raise BadInput(f"reduce.{name}", told)
-            whole = self.reduced[name] = whole.astype(np.result_type(whole, values), copy=False)
-            whole[part] = values
-        self.status[part] = done.status
+            shape, expected = values.shape[1:], first.reduced[name].shape[1:]
+            if shape != expected:
+                designs = f"designs {part.start} to {part.stop - 1}"
+                raise BadInput(f"reduce.{name}", f"{designs} have an array {shape} each, others {expected}")
+        self.blocks[number] = done
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
-    def takes(self, done: SolvedDesigns | ReducedBlock) -> bool:
-        return True
-
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
-        if not self.reduced:
+        if not self.blocks:
             raise interrupted(reason, "before a block of designs was reduced")
-        for name, values in self.reduced.items():
-            # what has no number that says so is written as one that has
-            self.reduced[name] = values if values.dtype.kind in "fc" else values.astype(float)
+        known = next(iter(self.blocks.values())).reduced
         for number, part in parts.items():
-            for values in self.reduced.values():
-                values[part] = np.nan
-            self.status[part] = INTERRUPTED
-            self.block_notes[number] = 0, 0, ((INTERRUPTED, part.stop - part.start, reason),)
+            count = part.stop - part.start
+            unknown = {
+                # what has no number that says so is written as one that has
+                name: np.full((count, *values.shape[1:]), np.nan, values.dtype if values.dtype.kind in "fc" else float)
+                for name, values in known.items()
+            }
+            status, endings = np.full(count, INTERRUPTED, dtype=np.int8), ((INTERRUPTED, count, reason),)
+            self.write_block(number, part, ReducedBlock(unknown, status, 0, 0, endings))
 
     def result(self) -> ReducedSweep:
-        found = ReducedSweep(
-            self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.notes()
-        )
+        joined = join_blocks([block for _, block in sorted(self.blocks.items())])
+        swept = ReducedSweep(self.plan.all_designs.designs, *joined, self.notes())
         listed = self.plan.assemblies
-        return found if listed is None else replace(found, design=listed.design, assembly=listed.number)
+        return swept if listed is None else replace(swept, design=listed.design, assembly=listed.number)
 
 
 SolvePart = Callable[[list[Mechanism] | PinnedLinkages, SweepRequest, str], SweptPart]
@@ -284,8 +286,8 @@ def sweep_reduced(
         if name in missing and done and not reason:
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
     sent = sum(block.general_designs for block in blocks)
-    said = part_messages([block.endings for block in blocks], done, sent)
-    return join_blocks(blocks, (*end_message(done, reason), *said))
+    messages = part_messages([block.endings for block in blocks], done, sent)
+    return ReducedSweep({}, *join_blocks(blocks), (*end_message(done, reason), *messages))
 
 
 def _solve_and_reduce(
@@ -297,27 +299,8 @@ def _solve_and_reduce(
 ) -> tuple[ReducedBlock, set[str]]:
     """Reductions of some mechanisms, and which of the points that are wanted are there."""
     solved = solve(part, request, "float64")
-    there = {name for name in request.points or () if np.any(solved.point_rows(name) >= 0)}
-    return reduce_part(solved, reductions, dtype), there
-
-
-def reduce_part(part: SweptPart, reductions: Mapping[str, Reduction[Each]], dtype: str) -> ReducedBlock:
-    """What is kept of some mechanisms."""
-    general = [each for each in part.others if each.general]
-    positions = sum(int(np.sum(each.status == 0)) for each in general)
-    some = Each((part,), positions, len(general), ())
-    return ReducedBlock(
-        reduce_all(some, reductions, dtype), part.last_status, positions, len(general), find_endings(part)
-    )
-
-
-def join_blocks(blocks: Sequence[ReducedBlock], said: tuple[str, ...]) -> ReducedSweep:
-    """The reductions of all mechanisms, part after part. Raises BadInput where they are not of one shape."""
-    reduced = {}
-    for name in tuple(blocks[0].reduced) if blocks else ():
-        shapes = {block.reduced[name].shape[1:] for block in blocks}
-        if len(shapes) > 1:
-            raise BadInput(f"reduce.{name}", f"some mechanisms have an array {min(shapes)} each, others {max(shapes)}")
-        reduced[name] = np.concatenate([block.reduced.pop(name) for block in blocks])
-    status = np.concatenate([np.zeros(0, dtype=np.int8), *(block.status for block in blocks)])
-    return ReducedSweep({}, reduced, status, sum(block.general_positions for block in blocks), said)
+    general = [swept for swept in solved.others if swept.general]
+    positions = sum(int(np.sum(swept.status == 0)) for swept in general)
+    reduced = reduce_all(Each((solved,), positions, len(general), ()), reductions, dtype)
+    block = ReducedBlock(reduced, solved.last_status, positions, len(general), find_endings(solved))
+    return block, {name for name in request.points or () if np.any(solved.point_rows(name) >= 0)}

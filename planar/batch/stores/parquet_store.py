@@ -15,57 +15,41 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from planar.batch.block import SolvedDesigns
+from planar.batch.named_results.result_rows import ResultRow
 from planar.batch.results import Sweep
 from planar.batch.stores.store import (
-    BlockStore,
+    FolderStore,
     SweepPlan,
-    damaged_block_error,
-    foreign_store_error,
-    is_folder_begun,
     reporting_write_errors,
     result_views,
 )
 from planar.document.files import read_limited
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, file_sha256, write_atomically
 
-Array = np.ndarray
-
 MANIFEST = "_planar.json"
 """What makes a folder a store; readers pass over names that begin so."""
-COLUMN_SYMBOLS = {"position": ("", "m"), "velocity": ("v", "m/s"), "acceleration": ("a", "m/s^2")}
-READ_ERRORS = (OSError, KeyError, ValueError, TypeError, pa.ArrowException)
+POINT_LETTERS = {"position": "", "velocity": "v", "acceleration": "a"}
+READ_ERRORS = (BadInput, OSError, KeyError, ValueError, TypeError, pa.ArrowException)
 """What pyarrow raises of damaged files."""
 
 
-class ParquetStore(BlockStore):
+class ParquetStore(FolderStore):
     """See the module. A row for each design and step; a block is whole where its file has the checksum beside it."""
 
+    READ_ERRORS = READ_ERRORS
+
     def __init__(self, plan: SweepPlan, path: Path):
-        super().__init__(plan)
-        self.path, self.fingerprint = path, plan.fingerprint()
-        if is_folder_begun(path):
-            try:
-                about = json.loads(read_limited(path / MANIFEST))
-                self.size = int(about["block"])
-            except (BadInput, ValueError, KeyError, TypeError):
-                about = {}
-            if not isinstance(about, dict) or about.get("fingerprint") != self.fingerprint or self.size < 1:
-                raise foreign_store_error(path)
-            self.plan = plan = plan._replace(block_size=self.size)
-        else:
-            with reporting_write_errors(path):
-                write_atomically(
-                    path / MANIFEST, json.dumps({"fingerprint": self.fingerprint, "block": self.block_size}).encode()
-                )
-        for left in path.iterdir():
-            if PARTIAL_FILE_NAME.fullmatch(left.name):  # of a process that was killed
+        super().__init__(plan, path)
+        for file in path.iterdir():
+            if PARTIAL_FILE_NAME.fullmatch(file.name):  # of a process that was killed
                 with suppress(OSError):
-                    left.unlink()
+                    file.unlink()
         self.verified_files: dict[int, tuple[int, int]] = {}
         "of every block that has its checksum: when its file was written, and how long it is"
-        for number in range(plan.block_count):
-            with suppress(*READ_ERRORS, BadInput):
+        for number in range(self.plan.block_count):
+            with suppress(*READ_ERRORS):
                 self._verify_block(number)
                 about = json.loads(parquet.read_schema(self._block_path(number)).metadata[b"planar"])
                 self.block_notes[number] = about["general"], about["sent"], about["said"]
@@ -74,6 +58,12 @@ class ParquetStore(BlockStore):
                 self._block_path(number).exists() or self._checksum_path(number).exists()
             ):
                 self.damaged.add(number)
+
+    def read_about(self) -> Any:
+        return json.loads(read_limited(self.path / MANIFEST))
+
+    def write_about(self, about: dict[str, Any]) -> None:
+        write_atomically(self.path / MANIFEST, json.dumps(about).encode())
 
     def _verify_block(self, number: int) -> None:
         """Raises BadInput, or one of UNREADABLE, where a block is not whole; looked at once as long as it stays."""
@@ -106,21 +96,19 @@ class ParquetStore(BlockStore):
             "dead_point": np.repeat(done.dead_point, steps),
             "stop_position": np.repeat(done.stop_position, steps),
         }
-        named = column_names(self.plan)
-        for quantity, results in result_views(done.out, self.plan).items():
-            for name, values in results.items():
-                axes = np.moveaxis(values, 2, 0) if values.ndim == 3 else values[None]
-                for column, own in zip(named[quantity][name], axes, strict=True):
-                    columns[column] = np.ascontiguousarray(own).ravel()
-        said = [(code, count, str(sentence)) for code, count, sentence in done.endings]
+        for row, values in zip(self.plan.rows, result_views(done.out, self.plan), strict=True):
+            axes = np.moveaxis(values, 2, 0) if values.ndim == 3 else values[None]
+            for column, axis_values in zip(_column_names(row), axes, strict=True):
+                columns[column] = np.ascontiguousarray(axis_values).ravel()
+        endings = [(code, count, str(sentence)) for code, count, sentence in done.endings]
         about = {
             "fingerprint": self.fingerprint,
-            "block": self.block_size,
+            "block": self.plan.block_size,
             "number": number,
             "general": done.general_positions,
             "sent": done.general_designs,
-            "said": said,
-            "outcomes": [each.value for each in Outcome],
+            "said": endings,
+            "outcomes": [outcome.value for outcome in Outcome],
         }
         content, table = BytesIO(), pa.table(columns).replace_schema_metadata({"planar": json.dumps(about)})
         parquet.write_table(table, content, write_page_checksum=True)
@@ -130,28 +118,29 @@ class ParquetStore(BlockStore):
             write_atomically(
                 self._checksum_path(number), self._checksum_line(number, sha256(content.getbuffer()).hexdigest())
             )
-        self.block_notes[number] = done.general_positions, done.general_designs, said
+        self.block_notes[number] = done.general_positions, done.general_designs, endings
 
     def read_columns(self, columns: tuple[str, ...]) -> list[Array]:
         """Columns of all blocks, each (designs, steps + 1). Raises BadInput."""
-        found = [self._read_block(number, columns) for number in range(self.plan.block_count)]
-        return [np.concatenate(each) for each in zip(*found, strict=True)]
+        blocks = [self._read_block(number, columns) for number in range(self.plan.block_count)]
+        return [np.concatenate(column) for column in zip(*blocks, strict=True)]
 
     def _read_block(self, number: int, columns: tuple[str, ...]) -> list[Array]:
-        part = slice(number * self.block_size, min((number + 1) * self.block_size, self.plan.design_count))
+        part = self.block_slice(number)
         shape = part.stop - part.start, self.plan.all_designs.steps + 1
         try:
             self._verify_block(number)
             table = parquet.read_table(self._block_path(number), columns=list(columns), page_checksum_verification=True)
             return [table[name].to_numpy().reshape(shape) for name in columns]
-        except (*READ_ERRORS, BadInput):
-            raise damaged_block_error(self.path, number, part) from None
+        except READ_ERRORS:
+            raise self.damaged_block_error(number) from None
 
     def result(self) -> Sweep:
-        found = {quantity: _ParquetResults(self, names) for quantity, names in column_names(self.plan).items()}
+        columns = self.plan.by_quantity(map(_column_names, self.plan.rows))
+        results = {quantity: _ParquetResults(self, names) for quantity, names in columns.items()}
         status, inputs, *ends = self.read_columns(("status", "input", "dead_point", "stop_position"))
         common = inputs[0] if np.all(inputs == inputs[0]) else inputs
-        return self.make_sweep(found, status, common, (ends[0][:, 0], ends[1][:, 0]))
+        return self.make_sweep(results, status, common, (ends[0][:, 0], ends[1][:, 0]))
 
 
 class _ParquetResults(Mapping[str, Any]):
@@ -161,8 +150,8 @@ class _ParquetResults(Mapping[str, Any]):
         self.store, self.columns = store, columns
 
     def __getitem__(self, name: str) -> Array:
-        found = self.store.read_columns(self.columns[name])
-        return np.stack(found, axis=2) if len(found) > 1 else found[0]
+        columns = self.store.read_columns(self.columns[name])
+        return np.stack(columns, axis=2) if len(columns) > 1 else columns[0]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -171,16 +160,9 @@ class _ParquetResults(Mapping[str, Any]):
         return len(self.columns)
 
 
-def column_names(plan: SweepPlan) -> dict[str, dict[str, tuple[str, ...]]]:
-    """The columns of every result by quantity and name."""
-    found = {order: {name: _point_columns(order, name) for name in plan.point_names} for order in plan.quantities}
-    for row in plan.result_rows:
-        said = f"{row.name} {row.quantity.replace('_', ' ')}"
-        columns = [f"{said} [{row.unit}]"] if row.width == 1 else [f"{said} {axis} [{row.unit}]" for axis in "xy"]
-        found.setdefault(row.quantity, {})[row.name] = tuple(columns)
-    return found
-
-
-def _point_columns(order: str, point: str) -> tuple[str, ...]:
-    letter, unit = COLUMN_SYMBOLS[order]
-    return f"{point} {letter}x [{unit}]", f"{point} {letter}y [{unit}]"
+def _column_names(row: ResultRow) -> tuple[str, ...]:
+    """The columns of a result."""
+    if row.quantity in POINT_LETTERS:
+        return tuple(f"{row.name} {POINT_LETTERS[row.quantity]}{axis} [{row.unit}]" for axis in "xy")
+    result = f"{row.name} {row.quantity.replace('_', ' ')}"
+    return (f"{result} [{row.unit}]",) if row.width == 1 else tuple(f"{result} {axis} [{row.unit}]" for axis in "xy")

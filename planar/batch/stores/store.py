@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,11 +19,10 @@ from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedRe
 from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.document.files import to_dict
+from planar.foundation.arrays import Array, part_offsets
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
 from planar.foundation.time_limit import interrupted
-
-Array = np.ndarray
 
 MAX_BYTES_IN_MEMORY = 16 * 2**30
 """Bytes of results that are kept in memory."""
@@ -31,8 +30,8 @@ ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
 STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
-
-
+POINT_UNITS = ("m", "m/s", "m/s^2")
+RowValue = TypeVar("RowValue")
 INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
 """What stands for that in a status."""
 
@@ -74,31 +73,44 @@ class SweepPlan(NamedTuple):
         return POINT_QUANTITIES if self.all_designs.rates else POINT_QUANTITIES[:1]
 
     @property
-    def result_rows(self) -> tuple[ResultRow, ...]:
-        """What is told beside points."""
-        return self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
+    def rows(self) -> tuple[ResultRow, ...]:
+        """What is told at a step in the order of the numbers: of all points, then beside them."""
+        points = (
+            ResultRow(quantity, name, 2, unit)
+            for quantity, unit in zip(self.quantities, POINT_UNITS, strict=False)
+            for name in self.point_names
+        )
+        return *points, *self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
 
     @property
     def row_count(self) -> int:
         """How many numbers are told at a step."""
-        return 2 * len(self.all_designs.points) * len(self.quantities) + sum(row.width for row in self.result_rows)
+        return sum(row.width for row in self.rows)
+
+    def by_quantity(self, values: Iterable[RowValue]) -> dict[str, dict[str, RowValue]]:
+        """Values of all rows, one for each, by quantity and name."""
+        named: dict[str, dict[str, RowValue]] = {quantity: {} for quantity in self.quantities}
+        for row, value in zip(self.rows, values, strict=True):
+            named.setdefault(row.quantity, {})[row.name] = value
+        return named
 
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
-        whole, made = self.all_designs, hashlib.sha256()
-        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair, whole.dtype]
-        told = [STORE_VERSION, to_dict(whole.mechanism), grid, self.results, self.assemblies is not None, self.duration]
-        made.update(json.dumps(told, sort_keys=True, default=float).encode())
-        for name, values in sorted(whole.designs.items()):
-            made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
-        return made.hexdigest()
+        block, digest = self.all_designs, hashlib.sha256()
+        grid = [block.steps, block.points, block.rates, block.start, block.stop, block.pair, block.dtype]
+        results = [self.results, self.assemblies is not None, self.duration]
+        sweep = [STORE_VERSION, to_dict(block.mechanism), grid, *results]
+        digest.update(json.dumps(sweep, sort_keys=True, default=float).encode())
+        for name, values in sorted(block.designs.items()):
+            digest.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()
 
 
 class BlockStore(ABC):
     """Takes solved blocks, each by its number, and makes of them the result of the sweep."""
 
     def __init__(self, plan: SweepPlan):
-        self.plan, self.block_size = plan, plan.block_size
+        self.plan = plan
         self.finished: set[int] = set()
         self.damaged: set[int] = set()
         "blocks of which something was there already, but not whole"
@@ -114,16 +126,12 @@ class BlockStore(ABC):
         """A solved block, of these designs."""
 
     def takes(self, done: SolvedDesigns) -> bool:
-        """Whether a block is kept: in a store that is gone on with, only one that no time limit ended."""
-        return all(code != INTERRUPTED for code, _, _ in done.endings)
+        """Whether a block is kept."""
+        return True
 
+    @abstractmethod
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         """Say that blocks are not solved, as a computation ended early. Raises NoAnswer."""
-        many = self.plan.design_count
-        done = many - sum(part.stop - part.start for part in parts.values())
-        raise interrupted(
-            reason, f"after {done} of {many} designs, which the store has", "the same sweep into this store goes on"
-        )
 
     @abstractmethod
     def result(self) -> Any:
@@ -131,44 +139,33 @@ class BlockStore(ABC):
 
     def notes(self) -> SweepNotes:
         """What there is to say, in the order of the designs, whichever block was solved first."""
-        blocks = [each for _, each in sorted(self.block_notes.items())]
+        notes = [note for _, note in sorted(self.block_notes.items())]
         ended: dict[int, tuple[int, Any]] = {}
-        for _, _, said in blocks:
-            for code, count, sentence in said:
-                before, first = ended.get(code, (0, sentence))
-                ended[code] = before + count, first
-        endings = tuple((code, *each) for code, each in sorted(ended.items()))
-        sent, plan = sum(each[1] for each in blocks), self.plan
-        return SweepNotes(plan.design_count, sent, self.general_positions, endings, plan.block_count, len(self.damaged))
+        for _, _, block_endings in notes:
+            for code, count, sentence in block_endings:
+                previous, first = ended.get(code, (0, sentence))
+                ended[code] = previous + count, first
+        endings = tuple((code, *ending) for code, ending in sorted(ended.items()))
+        general_designs, plan = sum(note[1] for note in notes), self.plan
+        counts = plan.design_count, general_designs, self.general_positions
+        return SweepNotes(*counts, endings, plan.block_count, len(self.damaged))
 
     @property
     def general_positions(self) -> int:
         """How many positions the general path solved."""
-        return sum(each[0] for each in self.block_notes.values())
+        return sum(note[0] for note in self.block_notes.values())
 
     def make_sweep(
-        self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array, ends: tuple[Any, Any]
+        self, results: Mapping[str, Mapping[str, Any]], status: Any, inputs: Array, ends: tuple[Any, Any]
     ) -> Sweep:
         """The result out of arrays by quantity and name; `ends`: where dead points and stops end designs."""
-        plan = self.plan
-        position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
-        assert position is not None
-        listed = plan.assemblies
-        rows: dict[str, Any] = {} if listed is None else {"design": listed.design, "assembly": listed.number}
-        more: dict[str, Any] = rows | {name: found[name] for name in found if name not in POINT_QUANTITIES}
-        return Sweep(
-            plan.point_names,
-            plan.all_designs.designs,
-            position,
-            velocity,
-            acceleration,
-            status,
-            input_,
-            self.general_positions,
-            *ends,
-            self.notes(),
-            **more,
-        )
+        plan, listed = self.plan, self.plan.assemblies
+        quantities: dict[str, Any] = {**dict.fromkeys(POINT_QUANTITIES), **results}
+        position, velocity, acceleration = (quantities.pop(quantity) for quantity in POINT_QUANTITIES)
+        if listed is not None:
+            quantities |= {"design": listed.design, "assembly": listed.number}
+        of_points = plan.point_names, plan.all_designs.designs, position, velocity, acceleration
+        return Sweep(*of_points, status, inputs, self.general_positions, *ends, self.notes(), **quantities)
 
 
 def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
@@ -208,19 +205,62 @@ def is_folder_begun(path: Path) -> bool:
             raise BadInput("store", f"{path} is a file, and a store is a folder; name another, or take it away first")
         path.mkdir(parents=True, exist_ok=True)
         return any(
-            not PARTIAL_FILE_NAME.fullmatch(each.name) and each.suffix != ZARR_PARTIAL_SUFFIX for each in path.iterdir()
+            not PARTIAL_FILE_NAME.fullmatch(file.name) and file.suffix != ZARR_PARTIAL_SUFFIX for file in path.iterdir()
         )
 
 
-def foreign_store_error(path: Path) -> BadInput:
-    """That a folder is not this sweep's to write in."""
-    return BadInput("store", f"{path} holds something else than this sweep; name another store, or take it away first")
+class FolderStore(BlockStore):
+    """A store in a folder of its own, which is gone on with where it is there."""
 
+    READ_ERRORS: tuple[type[Exception], ...] = ()
+    """What is raised of damaged files."""
 
-def damaged_block_error(path: Path, number: int, part: slice) -> BadInput:
-    """That a block of a store cannot be read."""
-    told = f"block {number} of {path} (designs {part.start} to {part.stop - 1}) is missing or damaged"
-    return BadInput("store", f"{told}; the same sweep into this store solves it again")
+    def __init__(self, plan: SweepPlan, path: Path):
+        super().__init__(plan)
+        self.path, self.fingerprint = path, plan.fingerprint()
+        if is_folder_begun(path):
+            try:
+                about = self.read_about()
+            except self.READ_ERRORS:
+                about = {}
+            size = about.get("block") if isinstance(about, dict) and about.get("fingerprint") == self.fingerprint else 0
+            if not isinstance(size, int) or size < 1:
+                reason = "holds something else than this sweep; name another store, or take it away first"
+                raise BadInput("store", f"{path} {reason}")
+            self.plan = plan._replace(block_size=size)
+        else:
+            with reporting_write_errors(path):
+                self.write_about({"fingerprint": self.fingerprint, "block": plan.block_size})
+
+    @abstractmethod
+    def read_about(self) -> Any:
+        """What the store says about itself. Raises one of `READ_ERRORS`."""
+
+    @abstractmethod
+    def write_about(self, about: dict[str, Any]) -> None:
+        """Begin the store with what it says about itself, so that it is this sweep's from its first moment."""
+
+    def block_slice(self, number: int) -> slice:
+        """The designs of a block."""
+        size = self.plan.block_size
+        return slice(number * size, min((number + 1) * size, self.plan.design_count))
+
+    def damaged_block_error(self, number: int) -> BadInput:
+        """That a block of the store cannot be read."""
+        part = self.block_slice(number)
+        block = f"block {number} of {self.path} (designs {part.start} to {part.stop - 1})"
+        return BadInput("store", f"{block} is missing or damaged; the same sweep into this store solves it again")
+
+    def takes(self, done: SolvedDesigns) -> bool:
+        """Only a block that no time limit ended, as the store is gone on with."""
+        return all(code != INTERRUPTED for code, _, _ in done.endings)
+
+    def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
+        count = self.plan.design_count
+        done = count - sum(part.stop - part.start for part in parts.values())
+        raise interrupted(
+            reason, f"after {done} of {count} designs, which the store has", "the same sweep into this store goes on"
+        )
 
 
 class MemoryStore(BlockStore):
@@ -229,10 +269,10 @@ class MemoryStore(BlockStore):
     def __init__(self, plan: SweepPlan):
         super().__init__(plan)
         self.shape = plan.all_designs.steps + 1, plan.row_count, plan.design_count
-        whole = np.prod(self.shape, dtype=float) * np.dtype(plan.all_designs.dtype).itemsize
-        if whole > MAX_BYTES_IN_MEMORY:
-            told = f"results of {whole * 1e-9:.0f} GB are too much for memory"
-            raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
+        size = np.prod(self.shape, dtype=float) * np.dtype(plan.all_designs.dtype).itemsize
+        if size > MAX_BYTES_IN_MEMORY:
+            message = f"results of {size * 1e-9:.0f} GB are too much for memory; name a store, as 'sweep.zarr'"
+            raise BadInput("store", message)
         self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
@@ -242,56 +282,45 @@ class MemoryStore(BlockStore):
         return self.out[:, :, part]
 
     def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
-        own = self.output_array(part)
-        if not np.may_share_memory(own, done.out):
-            own[:] = done.out
+        out = self.output_array(part)
+        if not np.may_share_memory(out, done.out):
+            out[:] = done.out
         self.status[part], self.dead_point[part] = done.status, done.dead_point
         self.stop_position[part] = done.stop_position
         self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
-    def takes(self, done: SolvedDesigns) -> bool:
-        return True
-
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         for number, part in parts.items():
-            many = part.stop - part.start
+            count = part.stop - part.start
             self.out[:, :, part], self.status[part] = np.nan, INTERRUPTED
-            self.inputs = _join_inputs(self.inputs, np.full((many, self.status.shape[1]), np.nan), part, self.plan)
-            self.block_notes[number] = 0, 0, ((INTERRUPTED, many, reason),)
+            self.inputs = _join_inputs(self.inputs, np.full((count, self.status.shape[1]), np.nan), part, self.plan)
+            self.block_notes[number] = 0, 0, ((INTERRUPTED, count, reason),)
 
     def result(self) -> Sweep:
         assert self.inputs is not None
         ends = self.dead_point, self.stop_position
-        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs, ends)
+        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, self.inputs, ends)
 
 
-def result_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
-    """out (steps + 1, rows, designs) by quantity and name, without a copy: arrays (designs, steps + 1), or of vectors
+def result_views(out: Array, plan: SweepPlan) -> list[Array]:
+    """out (steps + 1, rows, designs) by the rows of a plan, without a copy: arrays (designs, steps + 1), or of vectors
     (designs, steps + 1, 2)."""
-    turned = out.transpose(2, 0, 1)
-    many = len(plan.all_designs.points)
-    found = {
-        order: {
-            name: turned[:, :, 2 * (k * many + place) : 2 * (k * many + place) + 2]
-            for place, name in enumerate(plan.point_names)
-        }
-        for k, order in enumerate(plan.quantities)
-    }
-    at = 2 * many * len(plan.quantities)
-    for row in plan.result_rows:
-        values = turned[:, :, at] if row.width == 1 else turned[:, :, at : at + row.width]
-        found.setdefault(row.quantity, {})[row.name] = values
-        at += row.width
-    return found
+    rows, by_design = plan.rows, out.transpose(2, 0, 1)
+    offsets = part_offsets([row.width for row in rows])
+    return [
+        by_design[:, :, first] if row.width == 1 else by_design[:, :, first : first + row.width]
+        for row, first in zip(rows, offsets, strict=False)
+    ]
 
 
-def _join_inputs(whole: Array | None, own: Array, part: slice, plan: SweepPlan) -> Array:
+def _join_inputs(inputs: Array | None, part_inputs: Array, part: slice, plan: SweepPlan) -> Array:
     """The positions of the running input with those of a block; one row as long as all blocks agree."""
-    if own.ndim == 1 and (whole is None or (whole.ndim == 1 and np.array_equal(whole, own))):
-        return own
-    if whole is None or whole.ndim == 1:
-        row = np.full(plan.all_designs.steps + 1, np.nan) if whole is None else whole
-        whole = np.tile(row, (plan.design_count, 1))
-    whole[part] = own
-    return whole
+    is_common = inputs is None or (inputs.ndim == 1 and np.array_equal(inputs, part_inputs))
+    if part_inputs.ndim == 1 and is_common:
+        return part_inputs
+    if inputs is None or inputs.ndim == 1:
+        row = np.full(plan.all_designs.steps + 1, np.nan) if inputs is None else inputs
+        inputs = np.tile(row, (plan.design_count, 1))
+    inputs[part] = part_inputs
+    return inputs

@@ -13,20 +13,17 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from planar.batch.block import SolvedDesigns
+from planar.batch.named_results.result_rows import ResultRow
 from planar.batch.results import Sweep
 from planar.batch.stores.store import (
-    BlockStore,
+    FolderStore,
     SweepPlan,
-    damaged_block_error,
-    foreign_store_error,
-    is_folder_begun,
     reporting_write_errors,
     result_views,
 )
 from planar.document.files import to_dict
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
-
-Array = np.ndarray
 
 RECORD_BYTES = 32_768
 """Bytes of a block's record: a sentence for each outcome, as JSON."""
@@ -36,56 +33,39 @@ MISSING_STATUS = -1
 """The status of what is not there: none that a design can have."""
 
 
-class ZarrStore(BlockStore):
+class ZarrStore(FolderStore):
     """See the module. A block is whole once its record, written last, and all its chunks can be read."""
 
+    READ_ERRORS = READ_ERRORS
+
     def __init__(self, plan: SweepPlan, path: Path):
-        super().__init__(plan)
-        self.path, mark = path, plan.fingerprint()
-        if is_folder_begun(path):
-            try:
-                self.group = zarr.open_group(str(path), mode="r+")
-                about = dict(self.group.attrs)
-            except READ_ERRORS:
-                about = {}
-            size = about.get("block")
-            if about.get("fingerprint") != mark or not isinstance(size, int) or size < 1:
-                raise foreign_store_error(path)
-            self.size = size
-            self.plan = plan = plan._replace(block_size=self.size)
-        else:
-            # written at once: a store is this sweep's from its first moment
-            about = {
-                "fingerprint": mark,
-                "mechanism": to_dict(plan.all_designs.mechanism),
-                "points": list(plan.point_names),
-                "block": self.block_size,
-                "outcomes": [each.value for each in Outcome],
-            }
-            with reporting_write_errors(path):
-                self.group = zarr.create_group(str(path), attributes=about)
+        super().__init__(plan, path)
         with (
             reporting_write_errors(path),
             zarr.config.set({"array.write_empty_chunks": True}),
         ):  # a chunk that is not there is lost
             self.arrays = dict(self._open_arrays())
-        for number in range(plan.block_count):
+        for number in range(self.plan.block_count):
             self._verify_block(number)
+
+    def read_about(self) -> Any:
+        self.group = zarr.open_group(str(self.path), mode="r+")
+        return dict(self.group.attrs)
+
+    def write_about(self, about: dict[str, Any]) -> None:
+        about["mechanism"] = to_dict(self.plan.all_designs.mechanism)
+        about |= {"points": list(self.plan.point_names), "outcomes": [outcome.value for outcome in Outcome]}
+        self.group = zarr.create_group(str(self.path), attributes=about)
 
     def _open_arrays(self) -> Iterator[tuple[str, Any]]:
         """All arrays by name, those made that are not there or not as they have to be."""
-        plan, rows, steps = self.plan, self.block_size, self.plan.all_designs.steps + 1
+        plan, rows, steps = self.plan, self.plan.block_size, self.plan.all_designs.steps + 1
         row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        point: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
-        point["dimension_names"] = ("design", "step", "axis")
-        dtype = plan.all_designs.dtype
-        for order in plan.quantities:
-            for name in plan.point_names:
-                yield self._open_array(f"{order}/{_path_name(name)}", dtype=dtype, fill_value=np.nan, **point)
-        for result in plan.result_rows:
-            shape = point if result.width == 2 else row
-            path = f"{result.quantity}/{_path_name(result.name)}"
-            yield self._open_array(path, dtype=dtype, fill_value=np.nan, **shape)
+        vector: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
+        vector["dimension_names"] = ("design", "step", "axis")
+        for result in plan.rows:
+            shape = vector if result.width == 2 else row
+            yield self._open_array(_array_path(result), dtype=plan.all_designs.dtype, fill_value=np.nan, **shape)
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
         of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
@@ -112,10 +92,11 @@ class ZarrStore(BlockStore):
     def _open_array(self, name: str, **wanted: Any) -> tuple[str, Any]:
         wanted["compressors"] = (ZstdCodec(), Crc32cCodec())
         try:
-            there = self.group[name]
-            as_wanted = zarr.create_array(zarr.storage.MemoryStore(), **wanted).metadata
-            if isinstance(there, zarr.Array) and _is_same_metadata(there.metadata, as_wanted):
-                return name, there
+            array = self.group[name]
+            expected = zarr.create_array(zarr.storage.MemoryStore(), **wanted).metadata
+            # as text, since NaN equals nothing
+            if isinstance(array, zarr.Array) and repr(array.metadata.to_dict()) == repr(expected.to_dict()):
+                return name, array
         except READ_ERRORS:
             pass
         return name, self.group.create_array(name, overwrite=True, **wanted)
@@ -123,11 +104,13 @@ class ZarrStore(BlockStore):
     def _verify_block(self, number: int) -> None:
         """Take a block as finished that is whole, and as damaged of which only something is there."""
         record = self._read_record(number)
-        there = [self.is_readable(name, number) for name in self.arrays if _is_written_by_block(name)]
-        if record is not None and all(there):
+        # all arrays but those that are written at once, and the records
+        names = (name for name in self.arrays if name != "blocks" and not name.startswith("designs/"))
+        are_readable = [self.is_readable(name, number) for name in names]
+        if record is not None and all(are_readable):
             self.finished.add(number)
             self.block_notes[number] = record
-        elif record is not None or any(there):
+        elif record is not None or any(are_readable):
             self.damaged.add(number)
 
     def _read_record(self, number: int) -> tuple[int, int, Any] | None:
@@ -135,10 +118,10 @@ class ZarrStore(BlockStore):
             text = bytes(self.arrays["blocks"][number]).rstrip(b"\0")
             if not text:
                 return None
-            general, sent, said = json.loads(text)
+            positions, designs, endings = json.loads(text)
         except READ_ERRORS:
             return None
-        return None if general is None else (int(general), int(sent), [tuple(each) for each in said])
+        return None if positions is None else (int(positions), int(designs), [tuple(ending) for ending in endings])
 
     def has_chunk(self, name: str, number: int) -> bool:
         """Whether a block's chunk of an array is there."""
@@ -152,15 +135,10 @@ class ZarrStore(BlockStore):
             return False
         return self.has_chunk(name, number)
 
-    def block_slice(self, number: int) -> slice:
-        """The designs of a block."""
-        return slice(number * self.block_size, min((number + 1) * self.block_size, self.plan.design_count))
-
     def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
         with reporting_write_errors(self.path):
-            for order, points in result_views(done.out, self.plan).items():
-                for name, values in points.items():
-                    self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
+            for row, values in zip(self.plan.rows, result_views(done.out, self.plan), strict=True):
+                self.arrays[_array_path(row)][part] = np.ascontiguousarray(values)
             for name in ("status", "dead_point", "stop_position"):
                 self.arrays[name][part] = getattr(done, name)
             self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
@@ -170,23 +148,17 @@ class ZarrStore(BlockStore):
         self.block_notes[number] = note
 
     def result(self) -> Sweep:
-        found = {
-            order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.point_names}
-            for order in self.plan.quantities
-        }
-        for row in self.plan.result_rows:
-            stored = StoredArray(self, f"{row.quantity}/{_path_name(row.name)}")
-            found.setdefault(row.quantity, {})[row.name] = stored
+        results = self.plan.by_quantity(StoredArray(self, _array_path(row)) for row in self.plan.rows)
         ends = StoredArray(self, "dead_point"), StoredArray(self, "stop_position")
-        return self.make_sweep(found, StoredArray(self, "status"), self._input_positions(), ends)
+        return self.make_sweep(results, StoredArray(self, "status"), self._input_positions(), ends)
 
     def _input_positions(self) -> Any:
         """Positions of the input, as one row where all designs have the same; looked at block by block."""
         stored = StoredArray(self, "input")
         first = stored[0]
         for number in range(self.plan.block_count):
-            own = stored[self.block_slice(number)]
-            if not np.array_equal(np.broadcast_to(first, own.shape), own, equal_nan=True):
+            block = stored[self.block_slice(number)]
+            if not np.array_equal(np.broadcast_to(first, block.shape), block, equal_nan=True):
                 return stored
         return first
 
@@ -199,21 +171,21 @@ class StoredArray:
 
     def __getitem__(self, key: Any) -> Any:
         try:
-            found = self._array[key]
+            values = self._array[key]
         except READ_ERRORS:
             self._check_blocks(self._store.is_readable)
             raise
         # a chunk that is not there is read as what fills the array
-        if np.any(np.isnan(found) if self._array.dtype.kind == "f" else found == MISSING_STATUS):
+        if np.any(np.isnan(values) if self._array.dtype.kind == "f" else values == MISSING_STATUS):
             self._check_blocks(self._store.has_chunk)
-        return found
+        return values
 
     def _check_blocks(self, right: Callable[[str, int], bool]) -> None:
         """Raises BadInput for the first block that is not right."""
         store = self._store
         for number in range(store.plan.block_count):
             if not right(self._name, number):
-                raise damaged_block_error(store.path, number, store.block_slice(number)) from None
+                raise store.damaged_block_error(number) from None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # none of the array's own, nor of this one before it is made
@@ -224,27 +196,21 @@ class StoredArray:
         return self._array.shape[0]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        found = np.asarray(self[...])
-        return found if dtype is None else found.astype(dtype)
+        values = np.asarray(self[...])
+        return values if dtype is None else values.astype(dtype)
 
     def __repr__(self) -> str:
         return repr(self._array)
 
 
-def _is_written_by_block(name: str) -> bool:
-    """Whether an array is written block by block."""
-    return name != "blocks" and not name.startswith("designs/")
+def _shorten_sentences(endings: Any) -> list[Any]:
+    """How designs of a block ended, sentences shortened so that all fit into its record."""
+    longest = (RECORD_BYTES - 512) // (4 * max(1, len(endings)))  # a character has four bytes at most
+    return [[code, count, str(sentence)[:longest]] for code, count, sentence in endings]
 
 
-def _is_same_metadata(one: Any, other: Any) -> bool:
-    """Whether two arrays' metadata say the same; as text, since NaN equals nothing."""
-    return repr(one.to_dict()) == repr(other.to_dict())
-
-
-def _shorten_sentences(said: Any) -> list[Any]:
-    """What is said of a block, sentences shortened so that all fit into its record."""
-    longest = (RECORD_BYTES - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
-    return [[code, count, str(sentence)[:longest]] for code, count, sentence in said]
+def _array_path(row: ResultRow) -> str:
+    return f"{row.quantity}/{_path_name(row.name)}"
 
 
 def _path_name(name: str) -> str:

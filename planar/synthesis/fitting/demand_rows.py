@@ -11,9 +11,8 @@ import casadi as ca
 import numpy as np
 
 from planar.analysis.motion.transmission_angle import Transmission
-from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.force_equations import ForceEquations
-from planar.derivatives.transmission_system import loaded_output, output_angle
+from planar.derivatives.design_equations import DesignEquations, OutputBalance, design_equations
+from planar.derivatives.transmission_system import output_angle
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array, BoolArray, IntArray
@@ -136,16 +135,13 @@ def rate_rows(mechanism: Mechanism, free: Sequence[str], scale: Array) -> Adjoin
 def _transmission_systems(mechanism: Mechanism, transmissions: Sequence[Transmission]) -> Iterator[LinearSystem]:
     """The balance of each output under an effort on it alone, with its transmission angle (rad) by the forces of all
     constraints' multipliers; see `planar.transmission`."""
-    for each in transmissions:
-        pair = find_output_pair(mechanism, each.pair)[1]
-        balance = ForceEquations(design_equations(loaded_output(mechanism, pair)))
-        forces = (balance.force_on(name, each.link) for name in each.through)
-        angle = output_angle(balance.work, (each.link, pair), each.through, forces)
-        design = balance.design
-        given = [balance.work.factors, balance.constants, design.z1, design.z2]
-        known = [ca.SX.ones(given[0].numel()), *(ca.SX.zeros(other.numel()) for other in given[1:])]
-        acting, angle = ca.substitute([balance.in_unknowns(balance.acting), balance.in_unknowns(angle)], given, known)
-        yield LinearSystem(design, acting, balance.unknowns, angle)
+    design = design_equations(mechanism)
+    for output in transmissions:
+        pair = find_output_pair(mechanism, output.pair)[1]
+        balance = OutputBalance(design, pair)
+        forces = (balance.force_on(name, output.link) for name in output.through)
+        angle = output_angle(design.motion, (output.link, pair), output.through, forces)
+        yield LinearSystem(design, balance.acting, balance.unknowns, angle)
 
 
 class RegionRows:

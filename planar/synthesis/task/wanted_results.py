@@ -51,7 +51,8 @@ def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
     """The parts (parts,) of a wanted item in the unknowns and numbers of a design."""
 
     def position_of(name: str) -> ca.SX:
-        return design.in_link_coordinates(design.work.relative_positions([name])[0])
+        position: ca.SX = design.motion.input_position(design.work.relative_motions[name]).parts[0]
+        return position
 
     parts = wanted_parts(design.mechanism, design.placed[0], design.work.shapes, position_of, wanted)
     return stack_expressions(parts)
