@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, InputRanges, find_joiner
+from planar.batch.closed_form.dead_points import DeadPoints, search_dead_points
+from planar.batch.closed_form.joined_blocks import BlockJoiner, find_joiner
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.checks import (
@@ -43,15 +44,16 @@ class ClosedFormDesigns:
     def find_dead_points(self, reached: Array, lengths: Array, step: Array) -> DeadPoints:
         """The first dead points of designs that surely came so far, whose input is to go so far to either side, in
         steps of so much (designs,)."""
-        ranges = InputRanges(self.index, reached, lengths, np.minimum(step, LONGEST_STEP))
-        batch, stops = self.batch, self.batch.stops
+        batch, stops, sense = self.batch, self.batch.stops, np.sign(lengths)
+        if stops is not None and stops.has_wide_ranges:
+            batch = batch._replace(stops=stops.near_positions(self.stop_positions(sense * reached)))
+        ranges = (reached, np.abs(lengths), np.minimum(step, LONGEST_STEP), sense)
+        dead_points = search_dead_points(self.joiner.equations, self.index, batch, self.signs, ranges)
         if stops is None:
-            return self.joiner.find_dead_points(batch, self.signs, ranges)
-        if stops.has_wide_ranges:
-            batch = batch._replace(stops=stops.near_positions(self.stop_positions(np.sign(lengths) * reached)))
-        found = self._where_stops_are(self.joiner.find_dead_points(batch, self.signs, ranges), np.sign(lengths))
+            return dead_points
+        dead_points = self._where_stops_are(dead_points, sense)
         rooms = stops.input_rooms(self.direction @ batch.u0, lengths)
-        return DeadPoints(*nearest_end(*found, rooms, np.abs(lengths), self.end_count))
+        return DeadPoints(*nearest_end(*dead_points, rooms, np.abs(lengths), self.end_count))
 
     @property
     def end_count(self) -> int:
@@ -89,7 +91,7 @@ class ClosedFormDesigns:
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
         """The state (operands, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
         with np.errstate(all="ignore"):
-            return self.joiner.follow(batch, signs, u).state
+            return self.joiner.follow(batch, signs, u)
 
     def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
         """The points (rows, positions) of designs whose input has moved so far, and which pass the checks."""
@@ -114,7 +116,7 @@ def closed_form_designs(batch: DesignBatch, index: int, signs: Array | None) -> 
     """
     if signs is None or links_counting_turns(batch.mechanism):
         return None
-    joiner = find_joiner(batch._replace(links=()), ())
+    joiner = find_joiner(batch, None)
     if joiner is None:
         return None
     unknown = np.flatnonzero(~signs.all(axis=0))
