@@ -132,7 +132,6 @@ class DeadPointWriter(BlockJoinWriter):
         t.write_line("%k = phi i64 [0, %block], [%knext, %look]")
         values = self._write_evaluation(names, ranges[RANGES.index("sense")])
         self._write_changes([*self._look(), *self._refine(), *self._compare()], ranges, values)
-        self._write_changes(self._go_on(), ranges, values)
         busy = t.compare("olt", t.load(self.pointers["doing"]), t.constant(FINISHED))
         bits = t.add_instruction(f"bitcast <{t.lanes} x i1> {busy} to i{t.lanes}")
         is_any_busy = t.add_instruction(f"icmp ne i{t.lanes} {bits}, 0")
@@ -203,17 +202,18 @@ class DeadPointWriter(BlockJoinWriter):
         all_safe = _all(full, *(safe for safe, _ in judged))
         crossing = _all(full, ca.logic_not(all_safe), falls)
         finer = _all(full, ca.logic_not(all_safe), ca.logic_not(crossing))
-        next_x, next_safe, shorter = x + h, s["safe"] + 1.0, h * (1.0 / REFINEMENT)
+        next_x, next_safe, shorter, longer = x + h, s["safe"] + 1.0, h * (1.0 / REFINEMENT), ca.fmin(h + h, longest)
+        next_interval: Changes = {"x": next_x, "safe": next_safe, "place": next_x + (PLACES - 2.0) * h}
         grows = _all(all_safe, next_safe >= float(LEAST_INTERVALS), h < longest)
         known: Changes = {(k, n): near[k][n] for k in self.watched for n in range(PLACES)}
         shifted: Changes = {(k, n): near[k][n + 1] for k in self.watched for n in range(PLACES - 1)}
         return [
-            (looking, {**known, "filled": s["filled"] + 1.0}),
+            (looking, {**known, "filled": s["filled"] + 1.0, "place": x + s["filled"] * h}),
             (crossing, _begin_bracket(of, x, h, chosen)),
-            (all_safe, {**shifted, "x": next_x, "safe": next_safe, "filled": PLACES - 1.0}),
-            (grows, {"h": ca.fmin(h + h, longest), "safe": 0.0, "filled": 0.0}),
+            (all_safe, {**shifted, **next_interval, "filled": PLACES - 1.0}),
+            (grows, {"h": longer, "safe": 0.0, "filled": 0.0, "place": next_x - longer}),
             (_all(all_safe, next_x >= self.ranges["span"]), {"distance": inf, "doing": FINISHED}),
-            (finer, {"h": shorter, "safe": 0.0, "filled": 0.0}),
+            (finer, {"h": shorter, "safe": 0.0, "filled": 0.0, "place": x - shorter}),
             (_all(finer, shorter <= longest * LEAST_STEP_RATIO), {"doing": FINISHED}),
         ]
 
@@ -236,35 +236,29 @@ class DeadPointWriter(BlockJoinWriter):
         converged = _any(least <= ZERO_TOLERANCE, b - a <= BRACKET_TOLERANCE, count >= float(MAX_SECANTS))
         sure = _all(refining, converged, least <= FOUND_TOLERANCE)
         bracket: Changes = {"a": a, "fa": fa, "b": b, "fb": fb, "best": best, "least": least, "count": count}
-        is_alone = len(self.watched) == 1
+        is_alone, first_place = len(self.watched) == 1, best - (best - s["x"]) * OTHER_PLACES[0]
+        compared: Changes = {"doing": COMPARING, "place": first_place}
         return [
             (refining, {**bracket, "before": x, "f_before": f, "place": following}),
             (_all(refining, converged), {"doing": FINISHED}),
-            (sure, {"distance": best, "block": s["of"]} if is_alone else {"doing": COMPARING}),
+            (sure, {"distance": best, "block": s["of"]} if is_alone else compared),
         ]
 
     def _compare(self) -> list[tuple[ca.SX, Changes]]:
         """Of the lanes that have a dead point: whether the other blocks surely keep apart up to there."""
         s, comparing, last = self.slots, self._is_doing(COMPARING), self._is_doing(COMPARING_LAST)
-        fine = last
+        fine, last_place = last, s["best"] - (s["best"] - s["x"]) * OTHER_PLACES[1]
+        known: Changes = {(k, 2): value for k, value in enumerate(self.values)}
         for k, value in enumerate(self.values):
             first, second = s[k, 1], s[k, 2]
             half = 0.5 * ca.fabs((first + value) - (second + second))
             apart = _all(first > half, second > half, value > half)
             fine = _all(fine, _any(apart, _is_number(s["of"], k)))
         return [
-            (comparing, {**{(k, 2): value for k, value in enumerate(self.values)}, "doing": COMPARING_LAST}),
+            (comparing, {**known, "doing": COMPARING_LAST, "place": last_place}),
             (last, {"doing": FINISHED}),
             (fine, {"distance": s["best"], "block": s["of"]}),
         ]
-
-    def _go_on(self) -> list[tuple[ca.SX, Changes]]:
-        """Where the lanes look next, but for those that go nearer to a dead point."""
-        s, changes = self.slots, dict[float, ca.SX]()
-        changes[LOOKING] = s["x"] + (s["filled"] - 1.0) * s["h"]
-        for state, part in zip((COMPARING, COMPARING_LAST), OTHER_PLACES, strict=True):
-            changes[state] = s["best"] - (s["best"] - s["x"]) * part
-        return [(self._is_doing(state), {"place": place}) for state, place in changes.items()]
 
 
 def _is_number(value: ca.SX, number: float) -> ca.SX:
