@@ -233,7 +233,7 @@ class _NearReferenceSearch:
             self.batch.z0[block.unknowns] = root[:, None]
             other = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
             z = other.z[block.unknowns]
-            gaps = distances(self.is_angle[block.unknowns], z.T, np.moveaxis(known, 1, 2)).max(axis=2)
+            gaps = distances(self.is_angle[block.unknowns], z.T, np.array(known).transpose(0, 2, 1)).max(axis=2)
             is_new = other.converged & np.all(~(gaps <= SAME_ASSEMBLY_TOLERANCE), axis=0)
             cost = np.square(other.points - self.sketch)[rows].sum(axis=(0, 1))
             least = np.where(is_new, np.minimum(least, cost), least)

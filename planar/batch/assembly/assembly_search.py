@@ -47,17 +47,19 @@ class PartialAssemblies(NamedTuple):
     distance: Array
     tie_keys: tuple[Array, ...] = ()
 
-    def _map(self, change: Callable[[Array], Array]) -> PartialAssemblies:
-        rows = (change(self.z), change(self.exists), change(self.distance))
-        return PartialAssemblies(*rows, tuple(map(change, self.tie_keys)))
+    @staticmethod
+    def _map(change: Callable[..., Array], *assemblies: PartialAssemblies) -> PartialAssemblies:
+        rows = zip(*((part.z, part.exists, part.distance, *part.tie_keys) for part in assemblies), strict=True)
+        z, exists, distance, *tie_keys = (change(*arrays) for arrays in rows)
+        return PartialAssemblies(z, exists, distance, tuple(tie_keys))
 
     def select(self, designs: Array) -> PartialAssemblies:
         """Those of some designs."""
-        return self._map(lambda rows: rows[..., designs, :])
+        return self._map(lambda rows: rows[..., designs, :], self)
 
     def take(self, order: Array) -> PartialAssemblies:
         """Those options of each design (designs, options)."""
-        return self._map(lambda rows: np.take_along_axis(rows, order[None] if rows.ndim == 3 else order, axis=-1))
+        return self._map(lambda rows: np.take_along_axis(rows, order[None] if rows.ndim == 3 else order, axis=-1), self)
 
     def spread(self, z: Array, exists: Array) -> PartialAssemblies:
         """Options to add a block to each partial assembly, z (unknowns, designs, options, assemblies), side by side."""
@@ -81,8 +83,7 @@ class PartialAssemblies(NamedTuple):
             total[..., designs, :] = part
             return total
 
-        tie_keys = tuple(merged(*both) for both in zip(self.tie_keys, others.tie_keys, strict=True))
-        return PartialAssemblies(*(merged(*both) for both in zip(self[:3], others[:3], strict=True)), tie_keys)
+        return self._map(merged, self, others)
 
 
 LONGEST_NEWTON_STEP = 0.8

@@ -135,8 +135,8 @@ class BlockPaths:
 
     def solutions(self, unknowns: Array | ComplexArray) -> BlockSolutions:
         """Solutions from their unknowns (unknowns, lanes)."""
-        unknowns = unknowns.astype(complex)
-        return BlockSolutions(unknowns, np.exp(1j * unknowns[self.angles]))
+        complex_unknowns = unknowns.astype(complex)
+        return BlockSolutions(complex_unknowns, np.exp(1j * complex_unknowns[self.angles]))
 
     @staticmethod
     def conjugate(solutions: BlockSolutions) -> BlockSolutions:
