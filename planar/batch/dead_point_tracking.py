@@ -39,7 +39,7 @@ PASSES, DEAD_POINT, STOP = range(3)
 
 class FollowedDesigns(NamedTuple):
     """Which designs are settled (designs,), how many of their steps are solved (designs,), how far from the start their
-    dead points are, rad or sizes, infinitely where there is none (designs,), and the steps that were solved here:
+    dead points are, rad or sizes, infinitely where there is none (designs,), and the steps that were solved points:
     design, step (solved,) and the points there, out (rows, solved). It is a stop that ends a design where `stop`
     (designs,) is not negative: that of this pair, and behind these that of the input."""
 
@@ -197,33 +197,33 @@ class _DeadPointTracker:
             self.turns[:, active] = self.batch.stops.select(active).turns_between(positions)
         towards = np.zeros_like(y)
         towards[:, -1] = 1.0
-        here, step = curves.evaluate(y, towards), np.full(len(active), FIRST_STEP)
+        points, step = curves.evaluate(y, towards), np.full(len(active), FIRST_STEP)
         for _ in range(MAX_ARCS):
-            going = (here.regular_distance > CROSSING_DISTANCE) & (step > SHORTEST_STEP) & ~self.is_settled[active]
-            going &= np.isfinite(here.curvature).all(axis=1) & (np.abs(here.y).max(axis=1) < 1e3)
+            going = (points.regular_distance > CROSSING_DISTANCE) & (step > SHORTEST_STEP) & ~self.is_settled[active]
+            going &= np.isfinite(points.curvature).all(axis=1) & (np.abs(points.y).max(axis=1) < 1e3)
             if not going.all():
-                here, step, active = here.select(going), step[going], active[going]
+                points, step, active = points.select(going), step[going], active[going]
                 if not active.size:
                     return
                 curves = _DesignCurves(self.batch, active, self.direction)
-            bend = np.linalg.norm(here.curvature, axis=1)
+            bend = np.linalg.norm(points.curvature, axis=1)
             step = np.minimum.reduce(
-                [step, np.full(len(step), LONGEST_STEP), 1.2 * here.regular_distance, 0.8 * MAX_TANGENT_TURN / bend]
+                [step, np.full(len(step), LONGEST_STEP), 1.2 * points.regular_distance, 0.8 * MAX_TANGENT_TURN / bend]
             )
-            predicted = here.y + step[:, None] * here.tangent + 0.5 * step[:, None] ** 2 * here.curvature
-            y, fine = curves.correct(predicted, here.tangent)
-            after = curves.evaluate(y, here.tangent)
-            length = np.linalg.norm(y - here.y, axis=1)
-            fine &= np.sum(after.tangent * here.tangent, axis=1) > np.cos(MAX_TANGENT_TURN)
-            fine &= SINGULAR_DISTANCE_RATIO * length < here.regular_distance + after.regular_distance
+            predicted = points.y + step[:, None] * points.tangent + 0.5 * step[:, None] ** 2 * points.curvature
+            y, fine = curves.correct(predicted, points.tangent)
+            after = curves.evaluate(y, points.tangent)
+            length = np.linalg.norm(y - points.y, axis=1)
+            fine &= np.sum(after.tangent * points.tangent, axis=1) > np.cos(MAX_TANGENT_TURN)
+            fine &= SINGULAR_DISTANCE_RATIO * length < points.regular_distance + after.regular_distance
             fine &= length < 2.0 * step
             # an input that may have gone back and on again within the step
-            dips = (here.curvature[:, -1] < 0.0) & (after.curvature[:, -1] > 0.0) & (after.tangent[:, -1] > 0.0)
-            low = np.minimum(here.tangent[:, -1], after.tangent[:, -1])
-            bends = np.maximum(np.abs(here.curvature[:, -1]), np.abs(after.curvature[:, -1]))
+            dips = (points.curvature[:, -1] < 0.0) & (after.curvature[:, -1] > 0.0) & (after.tangent[:, -1] > 0.0)
+            low = np.minimum(points.tangent[:, -1], after.tangent[:, -1])
+            bends = np.maximum(np.abs(points.curvature[:, -1]), np.abs(after.curvature[:, -1]))
             fine &= ~(dips & (low < length * bends))
             end = np.where(after.tangent[:, -1] <= 0.0, DEAD_POINT, PASSES)
-            arcs = _CurveArcs(active, here.y, here.tangent, after.y, after.tangent, end)
+            arcs = _CurveArcs(active, points.y, points.tangent, after.y, after.tangent, end)
             if self.turns.size:
                 clear, meets = self._judge_stops(arcs)
                 meets &= end == PASSES
@@ -234,8 +234,8 @@ class _DeadPointTracker:
             self.is_settled[active[fine & is_last]] = True
             self.arcs.append(arcs.select(fine))
             step = np.where(fine, 1.6 * step, 0.5 * step)
-            parts = zip(after, here, strict=True)
-            here = _CurvePoints(*(np.where(fine.reshape(-1, *[1] * (new.ndim - 1)), new, old) for new, old in parts))
+            parts = zip(after, points, strict=True)
+            points = _CurvePoints(*(np.where(fine.reshape(-1, *[1] * (new.ndim - 1)), new, old) for new, old in parts))
 
     def _rooms(self, design: Array, y: Array) -> Array:
         """How far pairs are from their stops (stops, designs) at points of designs, negative beyond."""

@@ -207,7 +207,8 @@ class _NearReferenceSearch:
     def search(self) -> DesignAssemblies:
         """See `find_assemblies`."""
         corrected = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
-        costs, others = (np.square(at - self.sketch).sum(axis=1) for at in (corrected.points, corrected.other_points))
+        points = corrected.points, corrected.other_points
+        costs, others = (np.square(places - self.sketch).sum(axis=1) for places in points)
         clear, total, previous = corrected.converged.copy(), costs.sum(axis=0), np.zeros(len(corrected.converged))
         for block in self.blocks:
             rows = np.array(self.point_blocks) == block.block_index

@@ -154,21 +154,21 @@ class BlockCorrector:
         """Whether both assemblies of a block are known without a search."""
         return not self.counts_turns and self.functions.block_assemblies(block) is not None
 
-    def join(self, block: Block, here: PartialAssemblies) -> tuple[PartialAssemblies, Array]:
+    def join(self, block: Block, partial: PartialAssemblies) -> tuple[PartialAssemblies, Array]:
         """Partial assemblies with both assemblies of a block in closed form; for which designs these are sure."""
-        assemblies, exists = self.functions.block_assemblies(block), here.exists
+        assemblies, exists = self.functions.block_assemblies(block), partial.exists
         assert assemblies is not None
         width = exists.shape[1]
         u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
-        z = np.repeat(here.z[..., None], 2, axis=3)
-        both, coalescence = assemblies.evaluate_batch(here.z.reshape(len(here.z), -1).T, u, p)
+        z = np.repeat(partial.z[..., None], 2, axis=3)
+        both, coalescence = assemblies.evaluate_batch(partial.z.reshape(len(partial.z), -1).T, u, p)
         for k, unknowns in enumerate(both):
             z[block.unknowns, ..., k] = unknowns.T.reshape(-1, *exists.shape)
         near = coalescence.reshape(exists.shape)
         is_joined = near < MEETING_COSINE_SQUARED
         # of a length that turns on an arm this may have vanished
         is_open = (near >= CLEARLY_OPEN) & (not assemblies.has_changing_arm)
-        joined = here.spread(z, np.repeat((exists & is_joined)[..., None], 2, axis=2))
+        joined = partial.spread(z, np.repeat((exists & is_joined)[..., None], 2, axis=2))
         return joined, np.all(is_joined | is_open | ~exists, axis=1)
 
     def _open_columns(self, flat: Array, busy: Array, design: Array) -> tuple[Array, Array, Array]:
@@ -227,7 +227,7 @@ class AssemblySearch:
         self.candidates = base.candidates
         unit = base.unit
         self.local_points = {
-            name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
+            name: {point: Vector(place.x / unit, place.y / unit) for point, place in shape.points.items()}
             for name, shape in shapes.items()
         }
         ends = np.cumsum([len(pair.number_kinds) for pair in base.mechanism.pairs])
@@ -245,11 +245,11 @@ class AssemblySearch:
 
     def search(self) -> DesignAssemblies:
         """See `find_assemblies`."""
-        joined, hasty = self._join_blocks(True)
+        joined, is_hasty = self._join_blocks(True)
         chosen = self._choose(joined)
         # a block that lies where it is meant may leave the later ones no place near the sketch
         cost = np.where(joined.exists, joined.distance, np.inf).min(axis=1)
-        again = np.flatnonzero(hasty & ~is_at_sketch(cost, self.sketched_point_count))
+        again = np.flatnonzero(is_hasty & ~is_at_sketch(cost, self.sketched_point_count))
         if again.size:
             shapes = {name: shape_of_designs(shape, again) for name, shape in self.shapes.items()}
             slow = AssemblySearch(self.reference, shapes, self.p[:, again], self.u[:, again])
@@ -259,43 +259,45 @@ class AssemblySearch:
 
     def _join_blocks(self, quick: bool) -> tuple[PartialAssemblies, Array]:
         """All blocks joined, and which designs had one that was clear by itself; without `quick` none is."""
-        hasty = np.zeros(self.design_count, dtype=bool)
+        is_hasty = np.zeros(self.design_count, dtype=bool)
         unknowns = len(self.equations.unknowns)
         zero = np.zeros((self.design_count, 1))
-        here = PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
-        for block, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
+        partial = PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
+        for block, (roots, base_count) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
             if slice_length(block.rows):
-                clear, on = self._extend_clearly(block, here, roots) if quick else (np.zeros(0, dtype=int), here)
+                clear, extended = np.zeros(0, dtype=int), partial
+                if quick:
+                    clear, extended = self._extend_clearly(block, partial, roots)
                 rest = np.setdiff1d(np.arange(self.design_count), clear)
-                hasty[clear], self.is_listed[clear] = True, False
+                is_hasty[clear], self.is_listed[clear] = True, False
                 if rest.size:
                     others, sure, listed = self._extend(
-                        self.corrector.select(rest), block, here.select(rest), roots, most
+                        self.corrector.select(rest), block, partial.select(rest), roots, base_count
                     )
-                    on = on._replace(distance=here.distance).replace(rest, others)
+                    extended = extended._replace(distance=partial.distance).replace(rest, others)
                     self.is_sure[rest] &= sure
                     self.is_listed[rest] &= listed
-                    none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
+                    none = np.flatnonzero(partial.exists.any(axis=1) & ~extended.exists.any(axis=1))
                     if none.size and self.corrector.has_closed_form(block):
                         self.failed_block[none[self.is_sure[none]]] = block.block_index
                         none = none[~self.is_sure[none]]
                     if none.size:
-                        self._refuse_designs(block, none, here, roots)
-                    before, on = on.distance, self._score(block, on)
-                    self._keep_clear_options(block, on, on.distance - before)
-                here = self._keep_nearest(on)
-        return here, hasty
+                        self._refuse_designs(block, none, partial, roots)
+                    previous, extended = extended.distance, self._score(block, extended)
+                    self._keep_clear_options(block, extended, extended.distance - previous)
+                partial = self._keep_nearest(extended)
+        return partial, is_hasty
 
-    def _keep_clear_options(self, block: Block, on: PartialAssemblies, cost: Array) -> None:
+    def _keep_clear_options(self, block: Block, extended: PartialAssemblies, cost: Array) -> None:
         """Keep which option of a larger block lies where it is meant: the search one by one may not look for others
         then, though later blocks can be joined to one of those alone."""
         sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
         if sketched and slice_length(block.unknowns) > 2:
-            costs = np.where(on.exists & is_at_sketch(cost, sketched), cost, np.inf)
-            nearest = on.take(np.argmin(costs, axis=1)[:, None]).z[block.unknowns, :, 0]
+            costs = np.where(extended.exists & is_at_sketch(cost, sketched), cost, np.inf)
+            nearest = extended.take(np.argmin(costs, axis=1)[:, None]).z[block.unknowns, :, 0]
             self.clear_options.append((block, np.where(np.isfinite(costs).any(axis=1), nearest, np.nan)))
 
-    def _refuse_designs(self, block: Block, designs: Array, here: PartialAssemblies, roots: Array) -> None:
+    def _refuse_designs(self, block: Block, designs: Array, partial: PartialAssemblies, roots: Array) -> None:
         """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
 
         That of blocks of two unknowns, whose least squares it cannot miss from starts on all sides; of larger ones
@@ -309,17 +311,17 @@ class AssemblySearch:
             self.failed_block[designs[all_known]] = block.block_index
         if unknowns > 2 or not designs.size:
             return
-        rows, options = np.nonzero(here.exists[designs])
+        rows, options = np.nonzero(partial.exists[designs])
         design, count = designs[rows], len(rows)
         starts = self.corrector.spread_starts(block, roots)[:: SPREAD_STARTS // DAMPED_STARTS]
         column = np.tile(np.arange(count), len(starts))
-        partial = here.z[:, design, options]
+        unextended = partial.z[:, design, options]
         function = self.functions.block_call(block)
 
         def closing(tried: Array) -> tuple[Array, Array]:
             # the last entry tells the columns apart: nothing depends on it, so no step moves it
             columns = np.rint(tried[:, -1]).astype(int)
-            z = partial[:, columns].T
+            z = unextended[:, columns].T
             z[:, block.unknowns] = tried[:, :-1]
             numbers = self.u.T[design[columns]], self.p.T[design[columns]]
             residuals, jacobian = function.evaluate_batch(len(columns), z, *numbers)
@@ -331,58 +333,62 @@ class AssemblySearch:
         near[design[column[result.residual < REFUSAL_TOLERANCE]]] = True
         self.failed_block[designs[~near[designs]]] = block.block_index
 
-    def _extend_clearly(self, block: Block, here: PartialAssemblies, roots: Array) -> tuple[Array, PartialAssemblies]:
+    def _extend_clearly(
+        self, block: Block, partial: PartialAssemblies, roots: Array
+    ) -> tuple[Array, PartialAssemblies]:
         """The designs with one option to add a block that is clearly the one meant, and that of every design.
 
         It is where it lies at the sketch, and the Jacobian is so regular that no other is near: see `BlockAssemblies`.
         """
         sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
         # of a block of two both assemblies may be near the sketch, where its links are short
-        if not sketched or here.exists.shape[1] > 1 or slice_length(block.unknowns) <= 2:
-            return np.zeros(0, dtype=int), here
-        z, closed, regularity = self.corrector.correct(block, here.z, here.exists, roots[:1], NEWTON_STEPS)
-        on = self._score(block, here.spread(z, closed))
-        near = is_at_sketch(on.distance - here.distance, sketched)
-        return np.flatnonzero((on.exists & near & is_clearly_regular(regularity[..., 0]))[:, 0]), on
+        if not sketched or partial.exists.shape[1] > 1 or slice_length(block.unknowns) <= 2:
+            return np.zeros(0, dtype=int), partial
+        z, closed, regularity = self.corrector.correct(block, partial.z, partial.exists, roots[:1], NEWTON_STEPS)
+        extended = self._score(block, partial.spread(z, closed))
+        near = is_at_sketch(extended.distance - partial.distance, sketched)
+        return np.flatnonzero((extended.exists & near & is_clearly_regular(regularity[..., 0]))[:, 0]), extended
 
     def _extend(
-        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+        self, corrector: BlockCorrector, block: Block, partial: PartialAssemblies, roots: Array, base_count: int
     ) -> tuple[PartialAssemblies, Array, Array]:
         """Every partial assembly with the options in which a block may be added, for which designs these are sure, and
         for which they are all there are."""
-        count, listing, is_large = len(here.exists), None, slice_length(block.unknowns) > 2
+        count, listing, is_large = len(partial.exists), None, slice_length(block.unknowns) > 2
         if is_large:
             from planar.batch.assembly.complete_lists import block_listing  # only where it is needed
 
             listing = block_listing(self.reference, block.block_index)
         if listing is None:
-            on, sure = self._extend_from_starts(corrector, block, here, roots, most)
-            return on, sure, np.full(count, not is_large)
-        z, exists, is_complete = listing.extend(here.z, here.exists, corrector.p, corrector.u)
-        on, rest, sure = here.spread(z, exists), np.flatnonzero(~is_complete), np.ones(count, dtype=bool)
+            extended, sure = self._extend_from_starts(corrector, block, partial, roots, base_count)
+            return extended, sure, np.full(count, not is_large)
+        z, exists, is_complete = listing.extend(partial.z, partial.exists, corrector.p, corrector.u)
+        extended, rest, sure = partial.spread(z, exists), np.flatnonzero(~is_complete), np.ones(count, dtype=bool)
         if rest.size:
-            others, sure[rest] = self._extend_from_starts(corrector.select(rest), block, here.select(rest), roots, most)
-            on = on.replace(rest, others)
-        return on, sure, is_complete
+            others, sure[rest] = self._extend_from_starts(
+                corrector.select(rest), block, partial.select(rest), roots, base_count
+            )
+            extended = extended.replace(rest, others)
+        return extended, sure, is_complete
 
     def _extend_from_starts(
-        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+        self, corrector: BlockCorrector, block: Block, partial: PartialAssemblies, roots: Array, base_count: int
     ) -> tuple[PartialAssemblies, Array]:
         """The same by Newton's method from the base's assemblies, and from starts all over the circles."""
         if corrector.has_closed_form(block):
-            return corrector.join(block, here)
-        sure = np.ones(len(here.exists), dtype=bool)
-        z, exists, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
+            return corrector.join(block, partial)
+        sure = np.ones(len(partial.exists), dtype=bool)
+        z, exists, _ = corrector.correct(block, partial.z, partial.exists, roots, NEWTON_STEPS)
         exists &= corrector.is_distinct(block, z, exists)
-        few = here.exists & (exists.sum(axis=2) < most)
+        few = partial.exists & (exists.sum(axis=2) < base_count)
         if few.any():
             # where some starts led astray or to one end, others are tried as well
             designs, options = np.nonzero(few)
             part = corrector.select(designs)
             more, closed, _ = part.correct(
                 block,
-                here.z[:, designs, options][:, :, None],
-                here.exists[designs, options][:, None],
+                partial.z[:, designs, options][:, :, None],
+                partial.exists[designs, options][:, None],
                 part.spread_starts(block, roots),
                 SPREAD_NEWTON_STEPS,
             )
@@ -392,16 +398,16 @@ class AssemblySearch:
             order = np.argsort(~closed[:, 0], axis=1, kind="stable")[:, : len(roots)]
             # more than the base has, or some but fewer: the search one by one may see it otherwise
             count = closed[:, 0].sum(axis=1)
-            sure[designs[(count > 0) & (count != most)]] = False
+            sure[designs[(count > 0) & (count != base_count)]] = False
             z[:, designs, options] = np.take_along_axis(more[:, :, 0], order[None], axis=2)
             exists[designs, options] = np.take_along_axis(closed[:, 0], order, axis=1)
-        return here.spread(z, exists), sure
+        return partial.spread(z, exists), sure
 
-    def _score(self, block: Block, here: PartialAssemblies) -> PartialAssemblies:
+    def _score(self, block: Block, partial: PartialAssemblies) -> PartialAssemblies:
         """The partial assemblies with what a block adds to how they are told apart."""
-        candidates, width = self.candidates, here.exists.shape[1]
+        candidates, width = self.candidates, partial.exists.shape[1]
         u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
-        coordinates = self.functions.coordinates(here.z.reshape(len(here.z), -1).T, u, p)
+        coordinates = self.functions.coordinates(partial.z.reshape(len(partial.z), -1).T, u, p)
         w = np.ascontiguousarray(coordinates.T).reshape(-1, self.design_count, width)
         names = candidates.sketched_by_level.get(block.block_index, ())
         sketched = {name: candidates.first_link[name][1:] for name in names}
@@ -414,14 +420,14 @@ class AssemblySearch:
             local = self.local_points[link][point]
             return frames[link].to_world(Vector(*(np.reshape(part, (-1, 1)) for part in local)))
 
-        distance = here.distance.copy()
+        distance = partial.distance.copy()
         for name, member in sketched.items():
             gap = place(*member) - candidates.sketch[name]
             distance += gap.dot(gap)
         if sketched:
-            return here._replace(distance=distance)
+            return partial._replace(distance=distance)
         # no sketch tells them apart: slides ahead of where they start first, then what lies higher, then farther
-        behind, far = np.zeros(here.exists.shape), np.zeros(here.exists.shape)
+        behind, far = np.zeros(partial.exists.shape), np.zeros(partial.exists.shape)
         for name, pair in pairs.items():
             if pair.coordinate_kinds:
                 numbers = [number[:, None] for number in self.numbers[name]]
@@ -431,27 +437,27 @@ class AssemblySearch:
                 far = far + position
         heights = [place(link, point).y for link in block.links for point in self.local_points[link]]
         height = np.mean(np.broadcast_arrays(*heights, far), axis=0) if heights else far * 0.0
-        return here._replace(distance=distance, tie_keys=(*here.tie_keys, behind, -height, -far))
+        return partial._replace(distance=distance, tie_keys=(*partial.tie_keys, behind, -height, -far))
 
-    def _keep_nearest(self, here: PartialAssemblies) -> PartialAssemblies:
+    def _keep_nearest(self, partial: PartialAssemblies) -> PartialAssemblies:
         """The partial assemblies nearest to the sketch, so many as are carried on."""
-        if here.exists.shape[1] <= MAX_PARTIAL_ASSEMBLIES:
-            return here
-        cost = np.where(here.exists, here.distance, np.inf)
+        if partial.exists.shape[1] <= MAX_PARTIAL_ASSEMBLIES:
+            return partial
+        cost = np.where(partial.exists, partial.distance, np.inf)
         order = np.argsort(cost, axis=1, kind="stable")
         self.dropped_distance = np.minimum(
             self.dropped_distance, np.take_along_axis(cost, order, axis=1)[:, MAX_PARTIAL_ASSEMBLIES]
         )
-        return here.take(order[:, :MAX_PARTIAL_ASSEMBLIES])
+        return partial.take(order[:, :MAX_PARTIAL_ASSEMBLIES])
 
-    def _choose(self, here: PartialAssemblies) -> DesignAssemblies:
-        cost = np.where(here.exists, here.distance, np.inf)
+    def _choose(self, partial: PartialAssemblies) -> DesignAssemblies:
+        cost = np.where(partial.exists, partial.distance, np.inf)
         least = cost.min(axis=1)
         best = np.argmin(cost, axis=1)
-        alike = here.exists & (cost <= least[:, None] + EQUAL_DISTANCE_TOLERANCE)
+        alike = partial.exists & (cost <= least[:, None] + EQUAL_DISTANCE_TOLERANCE)
         tied = np.flatnonzero(alike.sum(axis=1) > 1)
         if tied.size:
-            keys = [key[tied] for key in here.tie_keys]
+            keys = [key[tied] for key in partial.tie_keys]
             # behind counts over all blocks, the rest block after block
             keys = [reduce(np.add, keys[::3]), *(key for k, key in enumerate(keys) if k % 3)] if keys else []
             alike = alike[tied]
@@ -460,7 +466,7 @@ class AssemblySearch:
                 alike &= value <= value.min(axis=1, keepdims=True) + EQUAL_DISTANCE_TOLERANCE
             best[tied] = np.argmax(alike, axis=1)
             self.is_sure[tied[alike.sum(axis=1) > 1]] = False
-        z = here.take(best[:, None]).z[..., 0]
+        z = partial.take(best[:, None]).z[..., 0]
         shown = self.sketched_point_count
         clear = is_at_sketch(least, shown) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
         sure = (self.is_sure | clear) & np.isfinite(least) & (least < self.dropped_distance - EQUAL_DISTANCE_TOLERANCE)
@@ -474,7 +480,7 @@ class AssemblySearch:
             )
             sure &= is_at_sketch(least, shown, reach)
             # of two that lie where they are meant the search one by one may see one alone
-            sure &= np.count_nonzero(here.exists & is_at_sketch(cost, shown), axis=1) <= 1
+            sure &= np.count_nonzero(partial.exists & is_at_sketch(cost, shown), axis=1) <= 1
             for block, clear_option in self.clear_options:
                 angles = self.equations.unknown_is_angle[block.unknowns]
                 gaps = distances(angles, z[block.unknowns].T, clear_option.T)

@@ -84,17 +84,6 @@ def compile_newton_step(equations: KernelEquations, block: Block) -> tuple[Print
     return compile_numpy(listing, values, tuple(operands)), tuple(operands.values())
 
 
-class BlockSolutions(NamedTuple):
-    """Solutions: lengths and angles (unknowns, lanes), and exp(i angle) of the latter (angles, lanes)."""
-
-    unknowns: ComplexArray
-    directions: ComplexArray
-
-    def select(self, lanes: IntArray | BoolArray | slice) -> BlockSolutions:
-        """Those of some lanes."""
-        return BlockSolutions(self.unknowns[:, lanes], self.directions[:, lanes])
-
-
 class BlockPaths:
     """Follows the solutions of one block; `base`: arrays p, u and z (rows, 1) of a design near the others.
 
@@ -133,18 +122,9 @@ class BlockPaths:
             rows[name][k] = row if angle is None else angle + 4.0 * np.arctan(row)
         return rows
 
-    def solutions(self, unknowns: Array | ComplexArray) -> BlockSolutions:
-        """Solutions from their unknowns (unknowns, lanes)."""
-        complex_unknowns = unknowns.astype(complex)
-        return BlockSolutions(complex_unknowns, np.exp(1j * complex_unknowns[self.angles]))
-
-    @staticmethod
-    def conjugate(solutions: BlockSolutions) -> BlockSolutions:
-        """The conjugates of solutions: at real numbers they are solutions too."""
-        return BlockSolutions(solutions.unknowns.conj(), 1.0 / solutions.directions.conj())
-
-    def newton_step(self, at: BlockSolutions, numbers: ComplexArray) -> ComplexArray:
-        """What Newton's method takes away from the unknowns (unknowns, lanes), at numbers (numbers, lanes)."""
+    def newton_step(self, z: ComplexArray, numbers: ComplexArray) -> ComplexArray:
+        """What Newton's method takes away from the block's unknowns z (unknowns, lanes), at numbers (numbers,
+        lanes)."""
         first, values = self.block.unknowns.start, {}
         for row, (name, k), angle in zip(numbers, self.number_operands, self.base_angles, strict=True):
             if angle is None:
@@ -155,40 +135,40 @@ class BlockPaths:
             cos, sin = half_cos * half_cos - half_sin * half_sin, 2.0 * half_cos * half_sin
             values[f"{name}c", k] = cos * np.cos(angle) - sin * np.sin(angle)
             values[f"{name}s", k] = sin * np.cos(angle) + cos * np.sin(angle)
-        inverse = 1.0 / at.directions
-        cos, sin = 0.5 * (at.directions + inverse), -0.5j * (at.directions - inverse)
+        direction = np.exp(1j * z[self.angles])
+        inverse = 1.0 / direction
+        cos, sin = 0.5 * (direction + inverse), -0.5j * (direction - inverse)
         for k, c, s in zip(self.angles.tolist(), cos, sin, strict=True):
             values["zc", first + k], values["zs", first + k] = c, s
-        values |= {("z", first + k): at.unknowns[k] for k in self.lengths.tolist()}
+        values |= {("z", first + k): z[k] for k in self.lengths.tolist()}
         step = self.step(*(values[operand] for operand in self.step_operands))
-        return np.array([np.broadcast_to(part, at.unknowns.shape[1:]) for part in step])
-
-    def move(self, at: BlockSolutions, by: ComplexArray) -> BlockSolutions:
-        """Solutions moved on by so much (unknowns, lanes): directions turn by the fourth order's fraction for exp."""
-        turn = 1j * by[self.angles]
-        even, odd = 1.0 + turn * turn * (1.0 / 12.0), 0.5 * turn
-        return BlockSolutions(at.unknowns + by, at.directions * ((even + odd) / (even - odd)))
+        return np.array([np.broadcast_to(part, z.shape[1:]) for part in step])
 
     def follow(
-        self, start: BlockSolutions, begin: ComplexArray, end: ComplexArray, tolerances: Tolerances
-    ) -> tuple[BlockSolutions, BoolArray]:
-        """Solutions at numbers `begin` followed to the numbers `end`, both (numbers, lanes), on the straight path; and
-        which of them came to the end (lanes,)."""
-        count = start.unknowns.shape[1]
-        unknowns, directions = np.full_like(start.unknowns, np.nan), np.full_like(start.directions, np.nan)
-        arrived = np.zeros(count, dtype=bool)
+        self, start: ComplexArray, begin: ComplexArray, end: ComplexArray, tolerances: Tolerances
+    ) -> tuple[ComplexArray, BoolArray]:
+        """Solutions (unknowns, lanes) at numbers `begin` followed to the numbers `end`, both (numbers, lanes), on the
+        straight path, angles between -pi and pi; and which of them came to the end (lanes,)."""
+        count = start.shape[1]
+        solutions, arrived = np.full_like(start, np.nan), np.zeros(count, dtype=bool)
         with np.errstate(all="ignore"):  # what goes astray ends as what is no number
             for lanes in np.array_split(np.arange(count), max(1, ceil(count / LANES))):
-                paths = _LanePaths(self, start.select(lanes), begin[:, lanes], end[:, lanes], tolerances)
-                solutions, arrived[lanes] = paths.run()
-                step = np.full_like(solutions.unknowns, np.nan)
+                z, came = _LanePaths(self, start[:, lanes], begin[:, lanes], end[:, lanes], tolerances).run()
+                step = np.full_like(z, np.nan)
                 for _ in range(END_CORRECTIONS):
-                    step = self.newton_step(solutions, end[:, lanes])
-                    solutions = self.move(solutions, -step)
-                unknowns[:, lanes], directions[:, lanes] = solutions
-                arrived[lanes] &= np.max(np.abs(step), axis=0) <= END_TOLERANCE
-            unknowns[self.angles] = -1j * np.log(directions)  # what was added up is only nearly that
-        return BlockSolutions(unknowns, directions), arrived
+                    step = self.newton_step(z, end[:, lanes])
+                    z = z - step
+                solutions[:, lanes], arrived[lanes] = z, came & (np.max(np.abs(step), axis=0) <= END_TOLERANCE)
+            angles = solutions[self.angles]
+            solutions[self.angles] = np.remainder(angles.real + np.pi, 2.0 * np.pi) - np.pi + 1j * angles.imag
+        return solutions, arrived
+
+    def keys(self, solutions: ComplexArray) -> ComplexArray:
+        """A number for each solution (lanes,), by which any two are told apart."""
+        rng = np.random.default_rng(1)
+        parts = np.concatenate([np.exp(1j * solutions[self.angles]), solutions[self.lengths]])
+        weights = rng.normal(size=len(parts)) + 1j * rng.normal(size=len(parts))
+        return np.asarray(weights @ parts)
 
 
 class _LanePaths:
@@ -197,26 +177,26 @@ class _LanePaths:
     def __init__(
         self,
         paths: BlockPaths,
-        start: BlockSolutions,
+        start: ComplexArray,
         begin: ComplexArray,
         end: ComplexArray,
         tolerances: Tolerances,
     ):
         self.paths, self.tolerances = paths, tolerances
-        self.at, self.begin, self.change = start, begin, end - begin
-        count = start.unknowns.shape[1]
+        self.z, self.begin, self.change = start, begin, end - begin
+        count = start.shape[1]
         self.part, self.length = np.zeros(count), np.full(count, FIRST_STEP)
         self.lanes = np.arange(count)
         self.times = np.full((KNOWN_PLACES, count), np.nan)
-        self.places = np.full((KNOWN_PLACES, *start.unknowns.shape), np.nan + 0j)
+        self.places = np.full((KNOWN_PLACES, *start.shape), np.nan + 0j)
         # the direction at the beginning as a place just before it
         self.times[0], self.times[1] = 0.0, -TANGENT_STEP
-        self.places[0] = start.unknowns
-        self.places[1] = start.unknowns + paths.newton_step(start, begin + TANGENT_STEP * self.change)
+        self.places[0] = start
+        self.places[1] = start + paths.newton_step(start, begin + TANGENT_STEP * self.change)
 
-    def run(self) -> tuple[BlockSolutions, BoolArray]:
-        """Where the lanes came to, and which of them came to the end."""
-        unknowns, directions = self.at.unknowns.copy(), self.at.directions.copy()
+    def run(self) -> tuple[ComplexArray, BoolArray]:
+        """Where the lanes came to (unknowns, lanes), and which of them came to the end."""
+        solutions = self.z.copy()
         arrived = np.zeros(len(self.part), dtype=bool)
         for step in range(MAX_STEPS):
             self._advance()
@@ -224,44 +204,43 @@ class _LanePaths:
             going = ~ended & (self.length > LEAST_STEP)
             if np.count_nonzero(going) > COMPACTION_RATIO * len(going) and step < MAX_STEPS - 1:
                 continue
-            unknowns[:, self.lanes], directions[:, self.lanes] = self.at
-            arrived[self.lanes] = ended
-            self.at, self.lanes = self.at.select(going), self.lanes[going]
+            solutions[:, self.lanes], arrived[self.lanes] = self.z, ended
+            self.z, self.lanes = self.z[:, going], self.lanes[going]
             self.begin, self.change = self.begin[:, going], self.change[:, going]
             self.part, self.length = self.part[going], self.length[going]
             self.times, self.places = self.times[:, going], self.places[:, :, going]
             if not self.lanes.size:
                 break
-        return BlockSolutions(unknowns, directions), arrived
+        return solutions, arrived
 
     def _advance(self) -> None:
         """One step of every lane; where its corrections are too great it is taken back, and the next one is shorter."""
         rest = 1.0 - self.part
         length = np.where(self.length >= 0.8 * rest, rest, self.length)
         ahead = np.where(length == rest, 1.0, self.part + length)
-        tried = self.paths.move(self.at, self._prediction(ahead))
+        tried = self.z + self._prediction(ahead)
         numbers, sizes = self.begin + ahead * self.change, []
         for _ in range(2):
             step = self.paths.newton_step(tried, numbers)
             sizes.append(np.max(np.abs(step), axis=0))
-            tried = self.paths.move(tried, -step)
+            tried = tried - step
         first, second = sizes
         good = (first <= self.tolerances[0]) & (second <= self.tolerances[1]) & (self.part < 1.0)
-        size = np.abs(tried.unknowns)
-        size[self.paths.angles] = np.abs(tried.unknowns[self.paths.angles].imag)
+        size = np.abs(tried)
+        size[self.paths.angles] = np.abs(tried[self.paths.angles].imag)
         good &= np.max(size, axis=0) < LARGEST_UNKNOWN
         known = np.count_nonzero(np.isfinite(self.times), axis=0)
         growth = np.clip((0.3 * self.tolerances[0] / np.maximum(first, 1e-300)) ** (1.0 / known), 0.5, 2.5)
         self.length = np.where(self.part >= 1.0, self.length, np.where(good, length * growth, 0.4 * length))
         self.part = np.where(good, ahead, self.part)
-        self.at = BlockSolutions(*(np.where(good, new, old) for new, old in zip(tried, self.at, strict=True)))
+        self.z = np.where(good, tried, self.z)
         self.times = np.where(good, np.concatenate([ahead[None], self.times[:-1]]), self.times)
-        self.places = np.where(good, np.concatenate([tried.unknowns[None], self.places[:-1]]), self.places)
+        self.places = np.where(good, np.concatenate([tried[None], self.places[:-1]]), self.places)
 
     def _prediction(self, ahead: Array) -> ComplexArray:
         """How far the unknowns go (unknowns, lanes), by Newton's divided differences of the places before."""
         times, level = self.times, self.places
-        total, factor = np.zeros_like(self.at.unknowns), np.ones_like(ahead)
+        total, factor = np.zeros_like(self.z), np.ones_like(ahead)
         for order in range(1, KNOWN_PLACES):
             level = (level[:-1] - level[1:]) / (times[: KNOWN_PLACES - order] - times[order:])[:, None]
             factor = factor * (ahead - times[order - 1])
@@ -287,8 +266,8 @@ NEW_DIRECTION, MAX_SPANNING = 1e-8, 200
 MAX_LANES = 2**16
 """Solutions that are followed in one go, so that they find room."""
 
-GenericStart = tuple[ComplexArray, BlockSolutions]
-"""Numbers (numbers, 1), and all solutions there."""
+GenericStart = tuple[ComplexArray, ComplexArray]
+"""Numbers (numbers, 1), and all solutions there (unknowns, lanes)."""
 
 
 def find_generic_starts(
@@ -306,26 +285,18 @@ def find_generic_starts(
     if assemblies is None or not 0 < len(assemblies) <= MAX_SOLUTIONS:
         return ()
     count = len(assemblies)
-    solutions, begin = paths.solutions(assemblies.T), np.repeat(paths.numbers(rows), count, axis=1).astype(complex)
+    solutions, begin = assemblies.T.astype(complex), np.repeat(paths.numbers(rows), count, axis=1).astype(complex)
     starts: list[GenericStart] = []
     for _ in range(TRIES + len(TOLERANCES)):
         offsets = SPREAD * sizes * (rng.normal(size=len(sizes)) + 1j * rng.normal(size=len(sizes)))
         drawn = np.asarray(base_numbers + span @ offsets[:, None], dtype=complex)
         ends, arrived = paths.follow(solutions, begin, np.repeat(drawn, count, axis=1), TOLERANCES[1])
-        keys = solution_keys(paths, ends)
+        keys = paths.keys(ends)
         if arrived.all() and np.count_nonzero(_is_same(keys[:, None], keys)) == count:
             starts.append((drawn, ends))
         if len(starts) == len(TOLERANCES):
             return tuple(starts)
     return ()
-
-
-def solution_keys(paths: BlockPaths, solutions: BlockSolutions) -> ComplexArray:
-    """A number for each solution (lanes,), by which any two are told apart."""
-    rng = np.random.default_rng(1)
-    parts = np.concatenate([solutions.directions, solutions.unknowns[paths.lengths]])
-    weights = rng.normal(size=len(parts)) + 1j * rng.normal(size=len(parts))
-    return np.asarray(weights @ parts)
 
 
 class CompleteLists(NamedTuple):
@@ -371,7 +342,7 @@ class BlockListing:
             starts = self._generic_starts(numbers[:, known])
         if not starts:
             return None
-        lanes, count = numbers.shape[1], starts[0][1].unknowns.shape[1]
+        lanes, count = numbers.shape[1], starts[0][1].shape[1]
         lists = CompleteLists(
             np.full((self.paths.unknown_count, lanes, count), np.nan),
             np.zeros((lanes, count), dtype=bool),
@@ -430,21 +401,21 @@ class BlockListing:
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> tuple[Array, BoolArray, BoolArray]:
         """All solutions of a start led to designs (numbers, lanes), as `CompleteLists`."""
         lanes, paths, (start_numbers, solutions) = numbers.shape[1], self.paths, start
-        count = solutions.unknowns.shape[1]
-        at = BlockSolutions(*(np.tile(rows, (1, lanes)) for rows in solutions))
-        begin = np.repeat(start_numbers, lanes * count, axis=1)
-        ends, arrived = paths.follow(at, begin, np.repeat(numbers, count, axis=1).astype(complex), tolerances)
-        unknowns, arrived = ends.unknowns.reshape(-1, lanes, count), arrived.reshape(lanes, count)
+        count = solutions.shape[1]
+        tiled, begin = np.tile(solutions, (1, lanes)), np.repeat(start_numbers, lanes * count, axis=1)
+        ends, arrived = paths.follow(tiled, begin, np.repeat(numbers, count, axis=1).astype(complex), tolerances)
+        unknowns, arrived = ends.reshape(-1, lanes, count), arrived.reshape(lanes, count)
         imaginary = np.max(np.abs(unknowns.imag), axis=0)
         exists = imaginary <= REAL_TOLERANCE
         undecided = (imaginary > REAL_TOLERANCE) & (imaginary < UNDECIDED_TOLERANCE)
-        keys = solution_keys(paths, ends).reshape(lanes, count)
+        keys = paths.keys(ends).reshape(lanes, count)
         ordered = np.sort(keys, axis=1)
         distinct = np.all(~_is_same(ordered[:, 1:], ordered[:, :-1]), axis=1)
         complete = arrived.all(axis=1) & distinct & (np.count_nonzero(~exists, axis=1) % 2 == 0)
         rest = np.flatnonzero(~complete)
         if rest.size:
-            mirrored = solution_keys(paths, paths.conjugate(ends)).reshape(lanes, count)
+            # at real numbers the conjugates of solutions are solutions too
+            mirrored = paths.keys(ends.conj()).reshape(lanes, count)
             complete[rest], first = _complete_with_conjugates(keys[rest], mirrored[rest], arrived[rest], exists[rest])
             exists[rest] &= first
         complete &= ~np.any(undecided & arrived, axis=1)

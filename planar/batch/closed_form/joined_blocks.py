@@ -68,23 +68,23 @@ class BlockJoinWriter(KernelWriter):
         `names` has p, q, the inputs, and ("sketch", k) of where the points are shown.
         """
         t, sign_operand = self.ir, ("sign", self.sign_index[part.block.block_index])
-        ways = [{**names, sign_operand: t.constant(sign)} for sign in (1.0, -1.0)]
-        coalescence, _ = (self.write_closed_form(part, way) for way in ways)
-        left, right = (self._write_distance(part, way) for way in ways)
-        nearer = t.select(t.compare("ole", left, right), t.constant(1.0), t.constant(-1.0))
+        options = [{**names, sign_operand: t.constant(sign)} for sign in (1.0, -1.0)]
+        coalescence, _ = (self.write_closed_form(part, option) for option in options)
+        first, second = (self._write_distance(part, option) for option in options)
+        nearer = t.select(t.compare("ole", first, second), t.constant(1.0), t.constant(-1.0))
         sign = t.select(t.compare("oeq", forced, "zeroinitializer"), nearer, forced)
-        is_left = t.compare("ogt", sign, "zeroinitializer")
+        is_first = t.compare("ogt", sign, "zeroinitializer")
         for operand in self.closed_form_operands(part):
-            names[operand] = t.select(is_left, *(way[operand] for way in ways))
-        return StartBlock(sign, t.select(is_left, left, right), t.select(is_left, right, left), coalescence)
+            names[operand] = t.select(is_first, *(option[operand] for option in options))
+        return StartBlock(sign, t.select(is_first, first, second), t.select(is_first, second, first), coalescence)
 
     def _write_distance(self, part: KernelBlock, names: OperandNames) -> str:
         """The squared distance of a block's sketched points from where they are shown."""
         t = self.ir
         points = [k for k, block in enumerate(self.point_blocks or ()) if block == part.block.block_index]
-        at = self.write_values([self.point_coordinates(points)], names)
+        coordinates = self.write_values([self.point_coordinates(points)], names)
         shown = [names["sketch", 2 * k + axis] for k in points for axis in range(2)]
-        gaps = [t.binary("sub", *both) for both in zip(at, shown, strict=True)]
+        gaps = [t.binary("sub", *both) for both in zip(coordinates, shown, strict=True)]
         return t.add_all([t.constant(0.0), *(t.binary("mul", gap, gap) for gap in gaps)])
 
     def write(self) -> str:
@@ -115,8 +115,8 @@ class BlockJoinWriter(KernelWriter):
 
         name(blocks, last, width, *arrays, out): the last block begins at design `last`; rows are `width` apart.
         """
-        given = ", ".join(f"ptr noalias readonly %{array}" for array in arrays)
-        self.ir.write_line(f"define void @{name}(i64 %blocks, i64 %last, i64 %width, {given}, ptr noalias %out) {{")
+        pointers = ", ".join(f"ptr noalias readonly %{array}" for array in arrays)
+        self.ir.write_line(f"define void @{name}(i64 %blocks, i64 %last, i64 %width, {pointers}, ptr noalias %out) {{")
         self.ir.write_label("entry")
 
     def load_designs(self) -> OperandNames:
