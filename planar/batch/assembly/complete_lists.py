@@ -27,7 +27,6 @@ from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 from planar.foundation.instruction_list import UnsupportedOperation, required_values
 from planar.model.pairs import MeasureKind
-from planar.solving.prepared_mechanism import PreparedMechanism
 
 ANALYTIC_OPERATIONS = frozenset({"input", "const", "add", "sub", "mul", "div", "neg", "cos", "sin"})
 """What a step may be made of: functions that keep their derivative at complex places."""
@@ -183,12 +182,13 @@ class _LanePaths:
         tolerances: Tolerances,
     ):
         self.paths, self.tolerances = paths, tolerances
-        self.z, self.begin, self.change = start, begin, end - begin
+        self.begin, self.change = begin, end - begin
         count = start.shape[1]
-        self.part, self.length = np.zeros(count), np.full(count, FIRST_STEP)
+        self.length = np.full(count, FIRST_STEP)
         self.lanes = np.arange(count)
         self.times = np.full((KNOWN_PLACES, count), np.nan)
         self.places = np.full((KNOWN_PLACES, *start.shape), np.nan + 0j)
+        "parts of the path at the last places (unknowns, lanes), the newest first"
         # the direction at the beginning as a place just before it
         self.times[0], self.times[1] = 0.0, -TANGENT_STEP
         self.places[0] = start
@@ -196,18 +196,17 @@ class _LanePaths:
 
     def run(self) -> tuple[ComplexArray, BoolArray]:
         """Where the lanes came to (unknowns, lanes), and which of them came to the end."""
-        solutions = self.z.copy()
-        arrived = np.zeros(len(self.part), dtype=bool)
+        solutions = self.places[0].copy()
+        arrived = np.zeros(len(self.times[0]), dtype=bool)
         for step in range(MAX_STEPS):
             self._advance()
-            ended = self.part >= 1.0
+            ended = self.times[0] >= 1.0
             going = ~ended & (self.length > LEAST_STEP)
             if np.count_nonzero(going) > COMPACTION_RATIO * len(going) and step < MAX_STEPS - 1:
                 continue
-            solutions[:, self.lanes], arrived[self.lanes] = self.z, ended
-            self.z, self.lanes = self.z[:, going], self.lanes[going]
+            solutions[:, self.lanes], arrived[self.lanes] = self.places[0], ended
+            self.lanes, self.length = self.lanes[going], self.length[going]
             self.begin, self.change = self.begin[:, going], self.change[:, going]
-            self.part, self.length = self.part[going], self.length[going]
             self.times, self.places = self.times[:, going], self.places[:, :, going]
             if not self.lanes.size:
                 break
@@ -215,32 +214,30 @@ class _LanePaths:
 
     def _advance(self) -> None:
         """One step of every lane; where its corrections are too great it is taken back, and the next one is shorter."""
-        rest = 1.0 - self.part
+        rest = 1.0 - self.times[0]
         length = np.where(self.length >= 0.8 * rest, rest, self.length)
-        ahead = np.where(length == rest, 1.0, self.part + length)
-        tried = self.z + self._prediction(ahead)
+        ahead = np.where(length == rest, 1.0, self.times[0] + length)
+        tried = self.places[0] + self._prediction(ahead)
         numbers, sizes = self.begin + ahead * self.change, []
         for _ in range(2):
             step = self.paths.newton_step(tried, numbers)
             sizes.append(np.max(np.abs(step), axis=0))
             tried = tried - step
         first, second = sizes
-        good = (first <= self.tolerances[0]) & (second <= self.tolerances[1]) & (self.part < 1.0)
+        good = (first <= self.tolerances[0]) & (second <= self.tolerances[1]) & (self.times[0] < 1.0)
         size = np.abs(tried)
         size[self.paths.angles] = np.abs(tried[self.paths.angles].imag)
         good &= np.max(size, axis=0) < LARGEST_UNKNOWN
         known = np.count_nonzero(np.isfinite(self.times), axis=0)
         growth = np.clip((0.3 * self.tolerances[0] / np.maximum(first, 1e-300)) ** (1.0 / known), 0.5, 2.5)
-        self.length = np.where(self.part >= 1.0, self.length, np.where(good, length * growth, 0.4 * length))
-        self.part = np.where(good, ahead, self.part)
-        self.z = np.where(good, tried, self.z)
+        self.length = np.where(self.times[0] >= 1.0, self.length, np.where(good, length * growth, 0.4 * length))
         self.times = np.where(good, np.concatenate([ahead[None], self.times[:-1]]), self.times)
         self.places = np.where(good, np.concatenate([tried[None], self.places[:-1]]), self.places)
 
     def _prediction(self, ahead: Array) -> ComplexArray:
         """How far the unknowns go (unknowns, lanes), by Newton's divided differences of the places before."""
         times, level = self.times, self.places
-        total, factor = np.zeros_like(self.z), np.ones_like(ahead)
+        total, factor = np.zeros_like(self.places[0]), np.ones_like(ahead)
         for order in range(1, KNOWN_PLACES):
             level = (level[:-1] - level[1:]) / (times[: KNOWN_PLACES - order] - times[order:])[:, None]
             factor = factor * (ahead - times[order - 1])
@@ -268,35 +265,6 @@ MAX_LANES = 2**16
 
 GenericStart = tuple[ComplexArray, ComplexArray]
 """Numbers (numbers, 1), and all solutions there (unknowns, lanes)."""
-
-
-def find_generic_starts(
-    setup: PreparedMechanism, paths: BlockPaths, base: Mapping[str, Array], span: Array
-) -> tuple[GenericStart, ...]:
-    """A start for each of `TOLERANCES` about a design with arrays p, u and z (rows, 1), from which they differ in the
-    directions of `span` (numbers, directions), orthonormal.
-
-    None of them where not all solutions are found, or they are too many.
-    """
-    rng, base_numbers = np.random.default_rng(0), paths.numbers(base)
-    sizes = np.linalg.norm(span * np.maximum(np.abs(base_numbers), LEAST_SIZE), axis=0)
-    rows = paths.rows(base_numbers + span @ (REAL_SPREAD * sizes * rng.normal(size=len(sizes)))[:, None], base)
-    assemblies = complex_assemblies(setup, paths.block, (rows["z"][:, 0], rows["u"][:, 0], rows["p"][:, 0]))
-    if assemblies is None or not 0 < len(assemblies) <= MAX_SOLUTIONS:
-        return ()
-    count = len(assemblies)
-    solutions, begin = assemblies.T.astype(complex), np.repeat(paths.numbers(rows), count, axis=1).astype(complex)
-    starts: list[GenericStart] = []
-    for _ in range(TRIES + len(TOLERANCES)):
-        offsets = SPREAD * sizes * (rng.normal(size=len(sizes)) + 1j * rng.normal(size=len(sizes)))
-        drawn = np.asarray(base_numbers + span @ offsets[:, None], dtype=complex)
-        ends, arrived = paths.follow(solutions, begin, np.repeat(drawn, count, axis=1), TOLERANCES[1])
-        keys = paths.keys(ends)
-        if arrived.all() and np.count_nonzero(_is_same(keys[:, None], keys)) == count:
-            starts.append((drawn, ends))
-        if len(starts) == len(TOLERANCES):
-            return tuple(starts)
-    return ()
 
 
 class CompleteLists(NamedTuple):
@@ -395,8 +363,32 @@ class BlockListing:
             self._span = np.linalg.qr(np.hstack([self._span, directions[:, sizes > NEW_DIRECTION]]))[0]
             self._starts = None
         if self._starts is None:
-            self._starts = find_generic_starts(self.setup, self.paths, self.base, self._span)
+            self._starts = tuple(self._find_starts())
         return self._starts
+
+    def _find_starts(self) -> list[GenericStart]:
+        """A start for each of `TOLERANCES` at numbers that differ from the base's in the directions of the span; none
+        where not all solutions are found, or they are too many."""
+        rng, paths, span = np.random.default_rng(0), self.paths, self._span
+        sizes = np.linalg.norm(span * np.maximum(np.abs(self.base_numbers), LEAST_SIZE), axis=0)
+        real_offsets = REAL_SPREAD * sizes * rng.normal(size=len(sizes))
+        rows = paths.rows(self.base_numbers + span @ real_offsets[:, None], self.base)
+        assemblies = complex_assemblies(self.setup, paths.block, (rows["z"][:, 0], rows["u"][:, 0], rows["p"][:, 0]))
+        starts: list[GenericStart] = []
+        if assemblies is None or not 0 < len(assemblies) <= MAX_SOLUTIONS:
+            return starts
+        count = len(assemblies)
+        solutions, begin = assemblies.T.astype(complex), np.repeat(paths.numbers(rows), count, axis=1).astype(complex)
+        for _ in range(TRIES + len(TOLERANCES)):
+            offsets = SPREAD * sizes * (rng.normal(size=len(sizes)) + 1j * rng.normal(size=len(sizes)))
+            drawn = np.asarray(self.base_numbers + span @ offsets[:, None], dtype=complex)
+            ends, arrived = paths.follow(solutions, begin, np.repeat(drawn, count, axis=1), TOLERANCES[1])
+            keys = paths.keys(ends)
+            if arrived.all() and np.count_nonzero(_is_same(keys[:, None], keys)) == count:
+                starts.append((drawn, ends))
+            if len(starts) == len(TOLERANCES):
+                return starts
+        return []
 
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> tuple[Array, BoolArray, BoolArray]:
         """All solutions of a start led to designs (numbers, lanes), as `CompleteLists`."""

@@ -142,16 +142,12 @@ class BlockJoinWriter(KernelWriter):
 class BlockJoiner:
     """Joins the blocks of the designs of a batch: with points by the sketch, see `join`, without by `follow`.
 
-    `state`: what stands for the unknowns. Raises UnsupportedOperation.
+    `state`: what stands for the unknowns. Raises UnsupportedOperation, and BareAngle where an angle counts its turns.
     """
 
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], point_blocks: tuple[int, ...] | None):
         writer = BlockJoinWriter(equations, links, point_blocks)
-        try:
-            self.text = writer.write()
-        except BareAngle as angle:
-            raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
-        self.equations, self.state = equations, writer.state_operands()
+        self.equations, self.text, self.state = equations, writer.write(), writer.state_operands()
 
     def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
         """At the inputs u0 of a batch, whose points are the sketched ones, each block in the assembly whose points lie
@@ -207,5 +203,5 @@ def _make_joiner(
 ) -> BlockJoiner | None:
     try:
         return BlockJoiner(equations, links, point_blocks)
-    except UnsupportedOperation:
+    except (UnsupportedOperation, BareAngle):
         return None
