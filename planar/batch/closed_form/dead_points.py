@@ -132,12 +132,11 @@ class DeadPointWriter(BlockJoinWriter):
         t.write_line("%k = phi i64 [0, %block], [%knext, %look]")
         values = self._write_evaluation(names, ranges[RANGES.index("sense")])
         self._write_changes([*self._look(), *self._refine(), *self._compare()], ranges, values)
-        busy = t.compare("olt", t.load(self.pointers["doing"]), t.constant(FINISHED))
-        bits = t.add_instruction(f"bitcast <{t.lanes} x i1> {busy} to i{t.lanes}")
-        is_any_busy = t.add_instruction(f"icmp ne i{t.lanes} {bits}, 0")
+        are_finished = t.all_flags(t.compare("oge", t.load(self.pointers["doing"]), t.constant(FINISHED)))
         t.write_line("%knext = add i64 %k, 1")
         has_places = t.add_instruction("icmp slt i64 %knext, %most.places")
-        t.write_line(f"br i1 {t.add_instruction(f'and i1 {is_any_busy}, {has_places}')}, label %look, label %blockend")
+        goes_on = t.add_instruction(f"select i1 {are_finished}, i1 false, i1 {has_places}")
+        t.write_line(f"br i1 {goes_on}, label %look, label %blockend")
         t.write_label("blockend")
         for row, name in enumerate(("distance", "block")):
             t.store(t.load(self.pointers[name]), self.entry_pointer("%out", row))
@@ -164,7 +163,8 @@ class DeadPointWriter(BlockJoinWriter):
         return [*values, *(t.binary("sub", t.constant(1.0), stop) for stop in self.write_stops(names))]
 
     def _write_changes(self, changes: list[tuple[ca.SX, Changes]], ranges: list[str], values: list[str]) -> None:
-        """Put values into slots of the lanes whose flag is up, one after the other; all are of the slots before."""
+        """Put values into slots of the lanes whose flag is up, the later ones over the earlier; all follow from the slots
+        as they are before."""
         t, listing = self.ir, InstructionList[int]()
         current: dict[Slot, str] = {name: t.load(pointer) for name, pointer in self.pointers.items()}
         symbols = [*self.slots.values(), *self.ranges.values(), *self.values]
@@ -196,8 +196,8 @@ class DeadPointWriter(BlockJoinWriter):
         judged = [_judge(values) for values in near]
         of, chosen, falls = ca.SX(-1.0), near[-1], judged[-1][1]
         for k in reversed(self.watched):  # the first block that is not safe
-            safe, own_falls = judged[k]
-            of, falls = ca.if_else(safe, of, k), ca.if_else(safe, falls, own_falls)
+            safe, block_falls = judged[k]
+            of, falls = ca.if_else(safe, of, k), ca.if_else(safe, falls, block_falls)
             chosen = [ca.if_else(safe, *both) for both in zip(chosen, near[k], strict=True)]
         all_safe = _all(full, *(safe for safe, _ in judged))
         crossing = _all(full, ca.logic_not(all_safe), falls)
