@@ -163,8 +163,8 @@ class DeadPointWriter(BlockJoinWriter):
         return [*values, *(t.binary("sub", t.constant(1.0), stop) for stop in self.write_stops(names))]
 
     def _write_changes(self, changes: list[tuple[ca.SX, Changes]], ranges: list[str], values: list[str]) -> None:
-        """Put values into slots of the lanes whose flag is up, the later ones over the earlier; all follow from the slots
-        as they are before."""
+        """Put values into slots of the lanes whose flag is up, the later ones over the earlier; all follow from the
+        slots as they are before."""
         t, listing = self.ir, InstructionList[int]()
         current: dict[Slot, str] = {name: t.load(pointer) for name, pointer in self.pointers.items()}
         symbols = [*self.slots.values(), *self.ranges.values(), *self.values]
