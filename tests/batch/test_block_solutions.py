@@ -5,7 +5,7 @@ import pytest
 
 import planar
 from planar.assemblies.block_roots import block_roots
-from planar.batch.block_solutions.complete_lists import BlockListing
+from planar.batch.assembly.complete_lists import BlockListing
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.reference_design import reference_design

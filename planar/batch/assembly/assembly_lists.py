@@ -23,7 +23,7 @@ from planar.solving.newton import CLOSED_TOLERANCE
 Array = np.ndarray
 
 MAX_ASSEMBLIES = 4096
-"""Of one design: of more it is not said that all are wanted."""
+"""Of one design: of more it is not clear that all are wanted."""
 
 
 class ListedAssemblies(NamedTuple):
@@ -40,74 +40,68 @@ class ListedAssemblies(NamedTuple):
 
 def list_assemblies(reference: ReferenceDesign, values: Mapping[str, Array]) -> ListedAssemblies:
     """All assemblies of designs with `values` (designs,) by name. Raises BadInput where one has too many."""
-    many = len(next(iter(values.values())))
-    rows = reference.design_rows(values, many)
+    count = len(next(iter(values.values())))
+    rows = reference.design_rows(values, count)
     fit = rows.is_fit & ~reference.is_unfit(values, rows.shapes)
-    found, decided = _list_dyads(reference, rows.p, rows.u, fit)
+    design, z, decided = _list_dyads(reference, rows.p, rows.u, fit)
     for index in np.flatnonzero(~decided):
-        z = _list_one_by_one(reference, values, int(index))
-        found = ListedAssemblies(
-            np.append(found.design, np.full(len(z), index)),
-            np.append(found.number, np.arange(1, len(z) + 1)),
-            np.concatenate([found.z, z.T], axis=1),
-        )
-    none = np.setdiff1d(np.arange(many), found.design)
-    design, number = np.append(found.design, none), np.append(found.number, np.zeros(len(none), dtype=int))
-    z = np.concatenate([found.z, np.full((len(found.z), len(none)), np.nan)], axis=1)
-    order = np.lexsort((number, design))
-    return ListedAssemblies(design[order], number[order], z[:, order])
+        assemblies = _list_one_by_one(reference, values, int(index))
+        design, z = np.append(design, np.full(len(assemblies), index)), np.concatenate([z, assemblies.T], axis=1)
+    none = np.setdiff1d(np.arange(count), design)
+    design, z = np.append(design, none), np.concatenate([z, np.full((len(z), len(none)), np.nan)], axis=1)
+    order = np.argsort(design, kind="stable")
+    design = design[order]
+    number = np.arange(1, len(design) + 1) - np.searchsorted(design, design)
+    return ListedAssemblies(design, np.where(np.isin(design, none), 0, number), z[:, order])
 
 
 def _list_one_by_one(reference: ReferenceDesign, values: Mapping[str, Array], index: int) -> Array:
     """The assemblies (assemblies, unknowns) of one design, by the complete list."""
-    base = reference.solver
-    none = np.zeros((0, len(base.equations.unknowns)))
+    unknowns, assemblies = list(reference.solver.equations.unknowns), []
     try:
-        every = modes(with_design_values(reference.mechanism, values_of_design(values, index)), certify=False)
-        found = list(islice(every, MAX_ASSEMBLIES + 1))
+        listing = modes(with_design_values(reference.mechanism, values_of_design(values, index)), certify=False)
+        assemblies = [mode.z for mode in islice(listing, MAX_ASSEMBLIES + 1)]
     except (NoAnswer, BadInput, PointPlacementError):
-        return none  # as its run will say
-    if len(found) > MAX_ASSEMBLIES:
+        return np.zeros((0, len(unknowns)))  # as its run will say
+    if len(assemblies) > MAX_ASSEMBLIES:
         raise BadInput("assemblies", f"design {index} has more than {MAX_ASSEMBLIES} assemblies")
-    scale = every.scale / base.scale
-    return np.array([mode.z * scale[list(base.equations.unknowns)] for mode in found]).reshape(-1, none.shape[1])
+    scale = listing.scale / reference.solver.scale
+    return np.reshape(assemblies, (-1, len(unknowns))) * scale[unknowns]
 
 
-def _list_dyads(reference: ReferenceDesign, p: Array, u: Array, fit: Array) -> tuple[ListedAssemblies, Array]:
-    """The assemblies of designs whose blocks are dyads that do not all but meet, or linear; which those are."""
-    equations, functions = reference.functions.equations, reference.functions
-    decided = fit.copy()
-    empty = np.zeros(0, dtype=int)
-    nothing = ListedAssemblies(empty, empty, np.zeros((len(equations.unknowns), 0)))
-    ways = [functions.block_assemblies(block) or _linear_block(reference, block) for block in equations.blocks]
-    if not reference.can_be_compiled or any(way is None for way in ways):
-        return nothing, np.zeros_like(fit)
-    design, z = np.flatnonzero(fit), np.zeros((len(equations.unknowns), int(fit.sum())))
-    for block, way in zip(equations.blocks, ways, strict=True):
-        own_u, own_p = u[:, design].T, p[:, design].T
-        if way is not None and not isinstance(way, bool):
-            both, left, bend = way.of_designs(z.T, own_u, own_p)
-            joins = (bend < MEETING_COSINE_SQUARED) & (left <= CLOSED_TOLERANCE)
-            decided[design[~(joins | is_out_of_reach(bend))]] = False
+def _list_dyads(reference: ReferenceDesign, p: Array, u: Array, fit: Array) -> tuple[Array, Array, Array]:
+    """The assemblies of designs whose blocks are dyads that do not all but meet, or linear: of which design (rows,),
+    and the unknowns (unknowns, rows); and which designs these are (designs,)."""
+    functions, decided = reference.functions, fit.copy()
+    equations, design = functions.equations, np.flatnonzero(fit)
+    z = np.zeros((len(equations.unknowns), len(design)))
+    forms = [functions.block_assemblies(block) for block in equations.blocks]
+    if not reference.can_be_compiled or not all(
+        form or _is_linear_block(reference, block) for block, form in zip(equations.blocks, forms, strict=True)
+    ):
+        return design[:0], z[:, :0], np.zeros_like(fit)
+    for block, form in zip(equations.blocks, forms, strict=True):
+        inputs, numbers = u[:, design].T, p[:, design].T
+        if form is not None:
+            both, residuals, coalescence = form.of_designs(z.T, inputs, numbers)
+            joins = (coalescence < MEETING_COSINE_SQUARED) & (residuals <= CLOSED_TOLERANCE)
+            decided[design[~(joins | is_out_of_reach(coalescence))]] = False
             z, design = np.repeat(z[:, joins], 2, axis=1), np.repeat(design[joins], 2)
             z[block.unknowns] = both[:, joins].transpose(2, 1, 0).reshape(slice_length(block.unknowns), -1)
         elif slice_length(block.unknowns):
             for _ in range(1 + POLISHING_STEPS):
-                gap, slope = functions.block_call(block).evaluate_batch(len(design), z.T, own_u, own_p)
-                z[block.unknowns] -= solve_vectors(slope.transpose(0, 2, 1), gap[:, 0]).T
-            decided[design[~(np.abs(gap[:, 0]).max(axis=1) <= CLOSED_TOLERANCE)]] = False
+                residuals, jacobian = functions.block_call(block).evaluate_batch(len(design), z.T, inputs, numbers)
+                z[block.unknowns] -= solve_vectors(jacobian.transpose(0, 2, 1), residuals[:, 0]).T
+            decided[design[~(np.abs(residuals[:, 0]).max(axis=1) <= CLOSED_TOLERANCE)]] = False
     kept = decided[design]
-    design, z = design[kept], z[:, kept]
-    first = np.searchsorted(design, design)
-    return ListedAssemblies(design, np.arange(len(design)) - first + 1, z), decided
+    return design[kept], z[:, kept], decided
 
 
-def _linear_block(reference: ReferenceDesign, block: Block) -> bool | None:
-    """Whether a block has one assembly, by linear equations; None where it may have others."""
+def _is_linear_block(reference: ReferenceDesign, block: Block) -> bool:
+    """Whether a block has one assembly, by linear equations; it may have others where that is not known."""
     if not slice_length(block.rows):
         return True
     try:
-        here = reference.solver.find_assembly().z
+        return is_linear(reference.solver, block, reference.solver.find_assembly().z)
     except NoAnswer:
-        return None
-    return is_linear(reference.solver, block, here) or None
+        return False

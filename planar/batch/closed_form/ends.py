@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.joined_blocks import BlockJoiner, DeadPoints, InputRanges, find_joiner
+from planar.batch.closed_form.dead_points import DeadPoints, search_dead_points
+from planar.batch.closed_form.joined_blocks import BlockJoiner, find_joiner
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.checks import (
@@ -43,66 +44,62 @@ class ClosedFormDesigns:
     def find_dead_points(self, reached: Array, lengths: Array, step: Array) -> DeadPoints:
         """The first dead points of designs that surely came so far, whose input is to go so far to either side, in
         steps of so much (designs,)."""
-        ranges = InputRanges(self.index, reached, lengths, np.minimum(step, LONGEST_STEP))
-        batch, stops = self.batch, self.batch.stops
+        batch, stops, sense = self.batch, self.batch.stops, np.sign(lengths)
+        if stops is not None and stops.has_wide_ranges:
+            batch = batch._replace(stops=stops.near_positions(self.stop_positions(sense * reached)))
+        ranges = (reached, np.abs(lengths), np.minimum(step, LONGEST_STEP), sense)
+        dead_points = search_dead_points(self.joiner.equations, self.index, batch, self.signs, ranges)
         if stops is None:
-            return self.joiner.find_dead_points(batch, self.signs, ranges)
-        if stops.has_wide_ranges:
-            batch = batch._replace(stops=stops.near_positions(self.stop_positions(np.sign(lengths) * reached)))
-        found = self._where_stops_are(self.joiner.find_dead_points(batch, self.signs, ranges), np.sign(lengths))
+            return dead_points
+        dead_points = self._where_stops_are(dead_points, sense)
         rooms = stops.input_rooms(self.direction @ batch.u0, lengths)
-        return DeadPoints(*nearest_end(*found, rooms, np.abs(lengths), self.end_count))
+        input_end = len(self.signs) + len(batch.stop_pairs)
+        return DeadPoints(*nearest_end(*dead_points, rooms, np.abs(lengths), input_end))
 
-    @property
-    def end_count(self) -> int:
-        """How many blocks, and pairs with stops, may end designs."""
-        return len(self.signs) + len(self.batch.stop_pairs)
-
-    def stops_of(self, found: DeadPoints) -> Array:
+    def stops_of(self, dead_points: DeadPoints) -> Array:
         """Which stop ends designs (designs,), -1 where none does."""
-        return np.where(found.block >= len(self.signs), found.block - len(self.signs), -1)
+        return np.where(dead_points.block >= len(self.signs), dead_points.block - len(self.signs), -1)
 
     def stop_positions(self, moved: Array) -> Array:
         """Where the pairs with stops are (stops, designs) when the input has moved so far (designs,)."""
         u = self.batch.u0 + moved * self.direction[:, None]
-        state = self.follow(self.batch, self.signs, u)
-        return pair_positions(self.batch, unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), u)
+        return pair_positions(self.batch, self.find_unknowns(self.batch, self.signs, u), u)
 
-    def _where_stops_are(self, found: DeadPoints, sense: Array) -> DeadPoints:
-        """Of what was found only that where stops are: what tells them is nothing elsewhere too."""
-        met, stops = np.flatnonzero(np.isfinite(found.distance) & (self.stops_of(found) >= 0)), self.batch.stops
-        if met.size and stops is not None:
+    def _where_stops_are(self, dead_points: DeadPoints, sense: Array) -> DeadPoints:
+        """The same, but nothing where a stop is none: what tells where stops are is nothing elsewhere too."""
+        end, stops = self.stops_of(dead_points), self.batch.stops
+        stopped = np.flatnonzero(np.isfinite(dead_points.distance) & (end >= 0))
+        if stopped.size and stops is not None:
             moved = np.zeros(len(sense))
-            moved[met] = sense[met] * found.distance[met]
-            is_there = stops.select(met).is_at_stop(self.stop_positions(moved)[:, met], self.stops_of(found)[met])
-            found.distance[met[~is_there]] = np.nan
-        return found
+            moved[stopped] = sense[stopped] * dead_points.distance[stopped]
+            positions = self.stop_positions(moved)[:, stopped]
+            is_at_stop = stops.select(stopped).is_at_stop(positions, end[stopped])
+            dead_points.distance[stopped[~is_at_stop]] = np.nan
+        return dead_points
 
     def lead(self, span: Array, step: float) -> tuple[Array, DeadPoints]:
         """Designs led on so far (designs,): the unknowns there (unknowns, designs), and what ends them before."""
-        found = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step))
-        ends = found._replace(distance=np.where(span == 0.0, np.inf, found.distance))
+        dead_points = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step))
+        dead_points = dead_points._replace(distance=np.where(span == 0.0, np.inf, dead_points.distance))
         u = self.batch.u0 + span * self.direction[:, None]
-        state = self.follow(self.batch, self.signs, u)
-        return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), ends
+        return self.find_unknowns(self.batch, self.signs, u), dead_points
 
-    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
-        """The state (operands, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
+    def find_unknowns(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
+        """z (unknowns, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
         with np.errstate(all="ignore"):
-            return self.joiner.follow(batch, signs, u).state
+            state = self.joiner.follow(batch, signs, u)
+        return unknowns_from_state(self.joiner.state, state, len(batch.z0))
 
     def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
         """The points (rows, positions) of designs whose input has moved so far, and which pass the checks."""
         out, passed = np.empty((self.batch.output_row_count, len(design))), np.zeros(len(design), dtype=bool)
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
-            own = self.batch.select(design[part])
+            batch = self.batch.select(design[part])
             # they lie before their ends
-            own = own if own.stops is None else own._replace(stops=own.stops.cleared())
-            u, signs = own.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
-            z = unknowns_from_state(self.joiner.state, self.follow(own, signs, u), len(own.z0))
-            row = allocate_aligned(1, len(out), len(moved[part]))
-            here = own._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u))))
-            passed[part] = run_designs(here, row) > 0
+            batch = batch if batch.stops is None else batch._replace(stops=batch.stops.cleared())
+            u, signs = batch.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
+            z, row = self.find_unknowns(batch, signs, u), allocate_aligned(1, len(out), len(moved[part]))
+            passed[part] = run_designs(batch._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u)))), row) > 0
             out[:, part] = row[0]
         return out, passed
 
@@ -114,12 +111,12 @@ def closed_form_designs(batch: DesignBatch, index: int, signs: Array | None) -> 
     """
     if signs is None or links_counting_turns(batch.mechanism):
         return None
-    joiner = find_joiner(batch._replace(links=()), ())
+    joiner = find_joiner(batch, None)
     if joiner is None:
         return None
     unknown = np.flatnonzero(~signs.all(axis=0))
     if unknown.size:
-        rows = (each[:, unknown] for each in (batch.z0, batch.u0, batch.p))
+        rows = (values[:, unknown] for values in (batch.z0, batch.u0, batch.p))
         signs[:, unknown] = joiner.equations.assembly_signs(*rows)
     return ClosedFormDesigns(joiner, batch, index, signs)
 
@@ -132,21 +129,19 @@ def find_ends(
     lengths (designs,): how far the input is to go, rad or sizes, in so many steps. Of these so many `candidates`
     (designs,) need not be solved here, see `run_designs`.
     """
-    step, count = np.abs(lengths) / steps, len(good)
-    found = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step)
-    ends = found.distance
-    nearest = np.clip(np.rint(ends / step), 0, steps) * step
-    settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
-    solved = np.where(settled, np.ceil(np.minimum(ends / step, steps + 1.0)), 0.0).astype(int)
-    left = np.maximum(solved - candidates, 0)
-    design = np.repeat(np.arange(count), left)
-    at = candidates[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
-    out, passed = designs.solve_positions(design, np.sign(lengths)[design] * at * step[design])
+    step = np.abs(lengths) / steps
+    dead_points = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step)
+    distance = dead_points.distance
+    nearest = np.clip(np.rint(distance / step), 0, steps) * step
+    settled = ~np.isnan(distance) & (np.abs(distance - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
+    solved = np.where(settled, np.ceil(np.minimum(distance / step, steps + 1.0)), 0.0).astype(int)
+    count = np.maximum(solved - candidates, 0)
+    design = np.repeat(np.arange(len(good)), count)
+    number = candidates[design] + np.arange(len(design)) - np.repeat(np.cumsum(count) - count, count)
+    out, passed = designs.solve_positions(design, np.sign(lengths)[design] * number * step[design])
     settled[design[~passed]] = False
-    kept = settled[design]
-    return FollowedDesigns(
-        settled, np.where(settled, solved, 0), ends, design[kept], at[kept], out[:, kept], designs.stops_of(found)
-    )
+    kept, solved, stop = settled[design], np.where(settled, solved, 0), designs.stops_of(dead_points)
+    return FollowedDesigns(settled, solved, distance, design[kept], number[kept], out[:, kept], stop)
 
 
 SEARCH_STEP = 0.03
@@ -175,15 +170,15 @@ def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
     settled = np.isfinite(length) & (length > LEAST_RANGE)
     out = allocate_aligned(steps + 1, batch.output_row_count, count)
     out[:] = np.nan
-    some = np.flatnonzero(settled)
+    limited = np.flatnonzero(settled)
     for step in range(1, steps):
-        moved = length[some] * (step / steps) - down.distance[some]
-        out[step][:, some], passed = designs.solve_positions(some, moved)
-        settled[some[~passed]] = False
-    for step, sense, found in ((0, -1.0, down), (steps, 1.0, up)):
-        moved, is_stop = sense * found.distance, found.block[some] >= len(designs.signs)
-        dead, stopped = some[~is_stop], some[is_stop]
-        rows, passed = _points_at_limit(designs, dead, moved[dead], found.block[dead], length[dead])
+        moved = length[limited] * (step / steps) - down.distance[limited]
+        out[step][:, limited], passed = designs.solve_positions(limited, moved)
+        settled[limited[~passed]] = False
+    for step, sense, ends in ((0, -1.0, down), (steps, 1.0, up)):
+        moved, is_stop = sense * ends.distance, ends.block[limited] >= len(designs.signs)
+        dead, stopped = limited[~is_stop], limited[is_stop]
+        rows, passed = _points_at_limit(designs, dead, moved[dead], ends.block[dead], length[dead])
         out[step][: len(rows), dead] = rows
         settled[dead[~passed]] = False
         if stopped.size:
@@ -195,27 +190,28 @@ def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
 
 
 def _points_at_limit(
-    designs: ClosedFormDesigns, some: Array, moved: Array, block: Array, length: Array
+    designs: ClosedFormDesigns, design: Array, moved: Array, block: Array, length: Array
 ) -> tuple[Array, Array]:
     """The points (rows, designs) of some designs at a dead point, and which of them pass the residual check.
 
     There two assemblies of a block meet as a root does: their middle goes straight on to it.
     """
-    signs = np.take(designs.signs, some, axis=1)
-    other, columns = signs.copy(), np.arange(len(some))
-    other[block, columns] *= -1.0
-    batch = designs.batch.select(some)
+    signs = np.take(designs.signs, design, axis=1)
+    other_signs = signs.copy()
+    other_signs[block, np.arange(len(design))] *= -1.0
+    batch, joiner = designs.batch.select(design)._replace(rates=False), designs.joiner
 
     def middle(part: float) -> Array:
         u = batch.u0 + (moved - np.sign(moved) * part * length) * designs.direction[:, None]
-        return np.asarray(0.5 * (designs.follow(batch, signs, u) + designs.follow(batch, other, u)))
+        return np.asarray(0.5 * (joiner.follow(batch, signs, u) + joiner.follow(batch, other_signs, u)))
 
-    state = 2.0 * middle(DISTANCE_FROM_LIMIT) - middle(2.0 * DISTANCE_FROM_LIMIT)
-    z = unknowns_from_state(designs.joiner.state, state, len(batch.z0)).T
-    u, functions = batch.u0 + moved * designs.direction[:, None], DesignFunctions(batch.functions, batch.p)
-    w, own = functions.coordinates(z, u.T), batch._replace(rates=False)
-    passed = make_residual_check(own).worst_residual(w, u) <= batch.tolerance
-    rows = np.empty((2 * len(batch.links), len(some)))
+    rows = np.empty((2 * len(batch.links), len(design)))
     with np.errstate(all="ignore"):  # the Jacobian is singular there
-        PointWriter(own, functions).write(rows, DesignsAtStep(z, u, w, passed, find_sensitivities(functions, z, u.T)))
+        state = 2.0 * middle(DISTANCE_FROM_LIMIT) - middle(2.0 * DISTANCE_FROM_LIMIT)
+        z = unknowns_from_state(joiner.state, state, len(batch.z0)).T
+        u, functions = batch.u0 + moved * designs.direction[:, None], DesignFunctions(batch.functions, batch.p)
+        w = functions.coordinates(z, u.T)
+        passed = make_residual_check(batch).worst_residual(w, u) <= batch.tolerance
+        positions = find_sensitivities(functions, z, u.T)
+        PointWriter(batch, functions).write(rows, DesignsAtStep(z, u, w, passed, positions))
     return rows, passed

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
-from planar.batch.assembly.nearest_assemblies import CORRECTIONS
-from planar.batch.initial_assembly import find_assemblies
+from planar.batch.initial_assembly import CORRECTIONS, find_assemblies
 from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, KernelRequest, write_designs_kernel
 from planar.batch.march.kernel import KernelEquations, Operand, operand_rows
 from planar.batch.march.kernel_writer import DesignsKernelLayout, write_angle_sum
@@ -215,7 +214,7 @@ class _NewtonRunWriter:
         return t.add_instruction(f"shufflevector {t.vector} {value}, {t.vector} poison, <{LANES} x i32> <{mask}>")
 
     def _write_is_nearest(self, found: tuple[str, str]) -> str:
-        """Whether the first lane is surely the assembly nearest to the sketch, as `NearestAssemblies` has it."""
+        """Whether the first lane is surely the assembly nearest to the sketch, as `find_assemblies` has it."""
         t = self.ir
         good, out = found
         blocks = [block for block, *_ in self.design.sketched]

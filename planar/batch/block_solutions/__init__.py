@@ -1,1 +1,0 @@
-"""All assemblies of larger blocks, of many designs at once: every complex solution followed from design to design."""
