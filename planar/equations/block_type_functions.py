@@ -15,9 +15,9 @@ import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.closed_form_assemblies import SETTLED_STEP, ClosedFormAssemblies
 from planar.equations.known_types import known_text
 from planar.equations.linear import solve_vectors
+from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies
 from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, greatest_size

@@ -12,16 +12,9 @@ from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import PlacedBlock, place_blocks
-from planar.equations.closed_form_assemblies import ClosedFormAssemblies
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.placed_blocks import (
-    BlockAssemblyCall,
-    BlockCall,
-    KnownCoordinates,
-    PlacedAssemblies,
-    PlacedBlockCall,
-)
+from planar.equations.placed_blocks import BlockCall, ClosedFormAssemblies, KnownCoordinates, PlacedBlockCall
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
 from planar.equations.symbolic_equations import (
@@ -68,16 +61,15 @@ class EquationFunctions:
     evaluated several times the formulas of all elements are made one, unless its unknowns are many.
     """
 
-    def __init__(self, equations: ConstraintEquations, formulas: StructureFormulas | None = None):
-        """`formulas` are those of equations that are not assembled from elements."""
+    def __init__(self, equations: ConstraintEquations):
         self.equations = equations
-        if formulas is not None:
-            self.formulas = formulas
         self._unknown_count, self._row_count = len(equations.unknowns), len(equations.rows)
         is_square = equations.is_square and self._unknown_count == self._row_count
         self.is_sparse = is_square and self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
         "whether Jacobians are by their entries"
         self._evaluation_count = 0.0
+        self._block_calls: dict[int, BlockCall] = {}
+        self._block_assemblies: dict[int, ClosedFormAssemblies | None] = {}
 
     @cached_property
     def formulas(self) -> StructureFormulas:
@@ -102,15 +94,11 @@ class EquationFunctions:
         if block.block_index not in self._block_calls:
             by_type = self._functions_of_type(block)
             self._block_calls[block.block_index] = (
-                self.formulas.block_call(block)
+                self.formulas.block_function(block)
                 if by_type is None
-                else PlacedBlockCall(block, by_type.closing, self._known_coordinates)
+                else PlacedBlockCall(by_type.closing, self._known_coordinates.arguments_of(block))
             )
         return self._block_calls[block.block_index]
-
-    @cached_property
-    def _block_calls(self) -> dict[int, BlockCall]:
-        return {}
 
     def _functions_of_type(self, block: Block) -> BlockTypeFunctions | None:
         """The functions of a block's type; None for one that has none."""
@@ -130,30 +118,26 @@ class EquationFunctions:
         assert self.equations.assembled is not None
         return KnownCoordinates(self.equations, self.equations.assembled, self.placed_blocks, calls)
 
-    def block_assemblies(self, block: Block) -> BlockAssemblyCall | None:
+    def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         """Both assemblies of a block; None for one without a closed form."""
         if block.block_index not in self._block_assemblies:
             self._block_assemblies[block.block_index] = self._make_assemblies(block)
         return self._block_assemblies[block.block_index]
 
-    @cached_property
-    def _block_assemblies(self) -> dict[int, BlockAssemblyCall | None]:
-        return {}
-
-    def _make_assemblies(self, block: Block) -> BlockAssemblyCall | None:
+    def _make_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         by_type = self._functions_of_type(block)
         if by_type is not None:
-            assemblies = by_type.assemblies
-            return assemblies and PlacedAssemblies(block, assemblies, self._known_coordinates)
+            form = by_type.assemblies
+            return form and form.placed(self._known_coordinates.arguments_of(block))
         from planar.equations.closed_form import closed_form_formula  # nearly all blocks have a type
 
         e = self.equations
-        form = closed_form_formula(e, block)
-        if form is None:
+        derived = closed_form_formula(e, block)
+        if derived is None:
             return None
-        counts = *(symbol.numel() for symbol in (e.z, e.u, e.p)), 1
-        function = FormulaFunction(form.formula, counts, ((1, slice_length(block.unknowns)), (1, 1)))
-        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), form.has_changing_arm)
+        shapes = (1, slice_length(block.unknowns)), (1, 1)
+        function = FormulaFunction(derived.formula, (*e.argument_counts, 1), shapes)
+        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), derived.has_changing_arm)
 
     def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""

@@ -6,28 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
-from math import factorial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from planar.equations.assembled_equations import AssembledJacobians
-from planar.equations.closed_form_assemblies import ArrayFunction
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
-from planar.equations.large_block_motion import DIFFERENCE_STEP
 from planar.equations.residuals import ConstraintRow
-from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
-from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
 from planar.equations.symbolic_equations import Block, ConstraintEquations, ConstraintExpressions
 from planar.foundation.arrays import Array
+from planar.foundation.lazy_module import LazyModule
 from planar.model.pairs import MeasureKind
 
 if TYPE_CHECKING:
     import casadi as ca
-
-CIRCLE_POINTS, CIRCLE_RADIUS = 32, 0.25
-"""Of a circle in complex time: aliased powers of the series are below round-off with this many points."""
-SMALLEST_CHANGE = 1e-12
+else:
+    ca = LazyModule("casadi")  # few structures have such equations
 
 
 class LowRankBlock(NamedTuple):
@@ -54,11 +47,6 @@ class LowRankBlock(NamedTuple):
         across = [_orthonormal_rows(rng, size, rows) for _ in range(rows - self.rank)]
         along = [_orthonormal_rows(rng, size, columns).T for _ in range(columns - self.rank)]
         return list(product(across, along))
-
-    def of_jacobians(self, jacobians: Array) -> Array:
-        """The part of Jacobians (..., rows, y)."""
-        part: Array = jacobians[..., np.array(self.rows)[:, None], np.array(self.columns)]
-        return part / np.multiply.outer(self.row_scales, self.column_scales)
 
 
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
@@ -102,28 +90,24 @@ def with_rank_conditions(functions: EquationFunctions, parts: Mapping[int, LowRa
         make_expressions=lambda: _conditioned_expressions(e, in_order, order),
         elimination=None,
     )
-    return EquationFunctions(conditioned, ConditionedEquations(conditioned, functions.formulas, in_order, order))
+    return EquationFunctions(conditioned)
 
 
 def _conditioned_expressions(
     e: ConstraintEquations, parts: Sequence[LowRankBlock], order: Sequence[int]
 ) -> ConstraintExpressions:
-    """The same as expressions, from which polynomials can be made."""
-    import casadi as ca  # few structures have such equations
-
+    """F with the conditions, and w, as expressions; `order` says which of F, then conditions, every row is."""
     F = [e.F]
     for part in parts:
         scales = np.multiply.outer(part.row_scales, part.column_scales)
         matrix = ca.densify(e.jacobian[list(part.rows), list(part.columns)]) / ca.DM(scales)
-        F += [_symbolic_determinant(ca.mtimes([ca.DM(rows), matrix, ca.DM(columns)])) for rows, columns in part.minors]
+        F += [symbolic_determinant(ca.mtimes([ca.DM(rows), matrix, ca.DM(columns)])) for rows, columns in part.minors]
     return e.expressions._replace(F=ca.vertcat(*F)[list(order)])
 
 
-def _symbolic_determinant(matrix: ca.SX) -> ca.SX:
+def symbolic_determinant(matrix: ca.SX) -> ca.SX:
     """A determinant without division, which would fail where it is to vanish (R. Bird, A simple division-free algorithm
     for computing determinants, Inf. Process. Lett. 111, 2011)."""
-    import casadi as ca
-
     size, part = matrix.size1(), matrix
     for _ in range(size - 1):
         upper = ca.triu(part, False)
@@ -131,150 +115,6 @@ def _symbolic_determinant(matrix: ca.SX) -> ca.SX:
             upper[k, k] = -sum((part[j, j] for j in range(k + 1, size)), ca.SX(0.0))
         part = ca.mtimes(upper, matrix)
     return part[0, 0] if size % 2 else -part[0, 0]
-
-
-class ConditionedEquations(StructureFormulas):
-    """The equations of one structure with conditions on the rank of parts of its Jacobian; `order` says which of the
-    constraints, then conditions, every row is."""
-
-    def __init__(
-        self, equations: ConstraintEquations, base: StructureFormulas, parts: Sequence[LowRankBlock], order: list[int]
-    ):
-        self._equations, self._base, self._parts, self._order = equations, base, parts, order
-        rows, columns = len(order), base.pattern.shape[1]
-        first = rows * np.arange(columns + 1)
-        self.pattern = SparsePattern((rows, columns), np.tile(np.arange(rows), columns), first)
-
-    @property
-    def recorded(self) -> StructureFormulas:
-        """The same as formulas that can be printed."""
-        return StructureFormulas(self._equations)
-
-    def coordinates(self, z: Array, u: Array, p: Array) -> Array:
-        """As `StructureFormulas.coordinates`."""
-        return self._base.coordinates(z, u, p)
-
-    def _conditions(self, jacobians: Array) -> Array:
-        """The conditions and their rates (orders, samples, conditions), from those of J (orders, samples, rows, y)."""
-        minors = [
-            determinant_rates(rows @ part.of_jacobians(jacobians) @ columns)
-            for part in self._parts
-            for rows, columns in part.minors
-        ]
-        return np.stack(minors, axis=-1)
-
-    def _condition_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """The conditions and their rates (orders, samples, conditions) from y and its rates, of (samples, y)."""
-        jacobians = [self._base.jacobian_rate(rates[: order + 1], p) for order in range(len(rates))]
-        return self._conditions(np.stack(jacobians))
-
-    def _with_conditions(self, y: Array, p: Array) -> AssembledJacobians:
-        """F with conditions (samples, rows), and the entries of dF/dy, at y (samples, y)."""
-        samples, count = y.shape
-        split = self._base.unknown_count
-        residuals, base_entries = self._base.residuals_and_jacobians(y[:, :split], y[:, split:], p)
-        here = np.asarray(SparseMatrices(self._base.pattern, base_entries))
-        units = np.tile(np.eye(count), (samples, 1))
-        changes = self._base.jacobian_changes(np.repeat(y, count, axis=0), units, p)
-        values, slopes = self._conditions(np.stack([np.repeat(here, count, axis=0), changes]))
-        columns = np.concatenate([here.swapaxes(1, 2), slopes.reshape(samples, count, -1)], axis=2)[..., self._order]
-        return AssembledJacobians(np.hstack([residuals, values[::count]])[:, self._order], columns.reshape(samples, -1))
-
-    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
-        """As `StructureFormulas.residuals_and_jacobians`."""
-        return self._with_conditions(np.hstack([z, np.broadcast_to(u, (len(z), u.shape[-1]))]), p)
-
-    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
-        """As `StructureFormulas.kinematics`."""
-        residuals, coordinates, _ = self._base.kinematics(y, y1, y2, p)
-        conditions = self._condition_rates((y, y1, y2), p).swapaxes(0, 1)
-        rows = np.concatenate([residuals, conditions], axis=2)[..., self._order]
-        return rows, coordinates, self._with_conditions(y, p).entries
-
-    def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """As `StructureFormulas.third_residual_rates`."""
-        conditions = self._condition_rates(rates, p)[3]
-        return np.hstack([self._base.third_residual_rates(rates, p), conditions])[:, self._order]
-
-    def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """As `StructureFormulas.third_coordinate_rates`."""
-        return self._base.third_coordinate_rates(rates, p)
-
-    def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
-        """As `StructureFormulas.jacobian_changes`, from second rates along sums and differences of directions."""
-        units, many = np.eye(len(y)), len(directions)
-        sums = (directions[:, None] + sign * units for sign in (1.0, -1.0))
-        rates = np.concatenate([ways.reshape(-1, len(y)) for ways in sums])
-        places = np.repeat(y[None], len(rates), axis=0)
-        second = self.kinematics(places, rates, 0.0 * rates, p)[0][:, 2]
-        ahead, behind = second.reshape(2, many, len(y), -1)
-        return (0.25 * (ahead - behind)).swapaxes(1, 2)
-
-    def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
-        """As `StructureFormulas.rounding_terms`; conditions by differences, and their numbers count nothing."""
-        terms = self._base.rounding_terms(y, y1, y2, p)
-        rows = len(self._order) - sum(part.condition_count for part in self._parts)
-        samples, count = y.shape
-        steps = np.tile(np.concatenate([np.eye(count), -np.eye(count)]) * DIFFERENCE_STEP, (samples, 1))
-        places, first, second = (np.repeat(rate, 2 * count, axis=0) for rate in (y, y1, y2))
-        conditions = self._condition_rates((places + steps, first, second), p)
-        ahead, behind = conditions.reshape(3, samples, 2, count, -1).transpose(2, 0, 1, 4, 3)
-        slopes = (ahead - behind) / (2.0 * DIFFERENCE_STEP)
-
-        def with_conditions(values: Array, of_conditions: Array) -> Array:
-            constraints = np.concatenate([values[:, :rows], of_conditions], axis=1)[:, self._order]
-            return np.concatenate([constraints, values[:, rows:]], axis=1)
-
-        none = np.zeros((samples, slopes.shape[2]))
-        return RoundingTerms(
-            with_conditions(terms.value, none),
-            with_conditions(terms.term_sum, none),
-            *(with_conditions(of_constraints, own) for of_constraints, own in zip(terms[2:], slopes, strict=True)),
-        )
-
-    def block_call(self, block: Block) -> ArrayFunction:
-        """As `StructureFormulas.block_call`."""
-        return _BlockOfConditioned(self, block)
-
-
-class _BlockOfConditioned:
-    """The residuals of a block (1, rows) and the columns of its Jacobian (unknowns, rows), called with z, u and p."""
-
-    def __init__(self, equations: ConditionedEquations, block: Block):
-        self._equations, self._block = equations, block
-
-    def __call__(self, *arguments: Array) -> list[Array]:
-        """At one position."""
-        z, u, p = arguments
-        return [values[0] for values in self.evaluate_batch(1, z[None], u[None], p)]
-
-    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
-        """At many positions z (positions, unknowns), u alike."""
-        z, u, p = arguments
-        residuals, entries = self._equations.residuals_and_jacobians(z, np.broadcast_to(u, (count, u.shape[-1])), p)
-        columns = entries.reshape(count, -1, residuals.shape[1])
-        return [residuals[:, None, self._block.rows], columns[:, self._block.unknowns, self._block.rows]]
-
-
-def determinant_rates(matrices: Array) -> Array:
-    """Determinants and their rates (orders, samples), from matrices and their rates (orders, samples, n, n)."""
-    orders = len(matrices)
-    with np.errstate(invalid="ignore"):  # of what is no number
-        return np.linalg.det(matrices) if orders == 1 else _determinant_series(matrices, orders)
-
-
-def _determinant_series(matrices: Array, orders: int) -> Array:
-    sizes = np.abs(matrices[1:]).max(axis=(2, 3), initial=0.0) ** (1.0 / np.arange(1, orders))[:, None]
-    # the power series in time, by its values on a circle on which nothing changes by much
-    radius = CIRCLE_RADIUS / np.maximum(sizes.max(axis=0, initial=0.0), SMALLEST_CHANGE)
-    times = radius * np.exp(2j * np.pi * np.arange(CIRCLE_POINTS) / CIRCLE_POINTS)[:, None]
-    moved = sum(
-        (times**order / factorial(order))[..., None, None] * matrices[order].astype(complex) for order in range(orders)
-    )
-    series = np.fft.fft(np.linalg.det(moved), axis=0)[:orders].real / CIRCLE_POINTS
-    rates: Array = series * np.array([factorial(order) / radius**order for order in range(orders)])
-    rates[0] = np.linalg.det(matrices[0])
-    return rates
 
 
 def _orthonormal_rows(rng: np.random.Generator, size: int, count: int) -> Array:
