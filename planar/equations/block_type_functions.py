@@ -15,7 +15,7 @@ import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.known_types import known_text
+from planar.equations.elements import known_text
 from planar.equations.linear import solve_vectors
 from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies
 from planar.equations.structure_formulas import StructureFormulas
@@ -117,7 +117,7 @@ class BlockTypeFunctions:
         `block_motion`."""
         unknowns, known, numbers = self._counts
         if unknowns > MAX_FORMULA_UNKNOWNS:
-            from planar.equations.large_block_motion import LargeBlockMotion  # few blocks are so large
+            from planar.equations.block_motion import LargeBlockMotion  # few blocks are so large
 
             return LargeBlockMotion(block_equations(self._key))
         formula = block_motion_formula(self._key)

@@ -14,9 +14,8 @@ import numpy as np
 
 from planar.equations.assembled_equations import Elimination
 from planar.equations.coordinates import Coordinate
-from planar.equations.elements import Element, PlacedElement
+from planar.equations.elements import Element, PlacedElement, fingerprint
 from planar.equations.elimination import EliminationRow
-from planar.equations.known_types import fingerprint
 from planar.equations.residuals import ConstraintRow
 from planar.equations.symbolic_equations import Block, ConstraintEquations, expressions_of_elimination
 from planar.foundation.arrays import IntArray

@@ -15,7 +15,7 @@ import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
-from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
+from planar.equations.elements import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_term_sizes

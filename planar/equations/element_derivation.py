@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from planar.equations.elements import Element, ElementArguments, ElementKey
+from planar.equations.elements import PARTS_OF_FRAME, Element, ElementArguments, ElementKey
 from planar.equations.elimination import stack_expressions
 from planar.equations.generic_evaluation import recorded_function
-from planar.equations.pair_formulas import PARTS_OF_FRAME
 from planar.foundation.recorded_formula import RecordedFormula
 
 

@@ -15,8 +15,7 @@ import numpy as np
 from planar.equations.assembled_equations import AssembledEquations, Elimination
 from planar.equations.block_decomposition import BlockIndices, decompose_blocks
 from planar.equations.coordinates import FRAME_PARTS, Coordinate, consecutive_ranges
-from planar.equations.element_placement import ElementPlacement
-from planar.equations.elements import PlacedElement
+from planar.equations.elements import ElementPlacement, PlacedElement
 from planar.equations.elimination import (
     CoordinateSymbols,
     EarlierRows,

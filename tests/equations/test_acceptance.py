@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from planar.equations.acceptance import AcceptanceFunctions, InputSamples
+from planar.equations.block_motion import LargeBlockMotion
 from planar.equations.block_types import block_equations
 from planar.equations.functions import EquationFunctions
-from planar.equations.large_block_motion import LargeBlockMotion
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.jets import Jet
 from planar.model.pairs import pair_types
