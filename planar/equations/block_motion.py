@@ -180,9 +180,8 @@ class LargeBlockMotion:
         nudge = DIFFERENCE_STEP / np.maximum(np.abs(y1).max(axis=1, initial=0.0), DIFFERENCE_STEP)
         split = jacobians.shape[-1]
         moved = y + nudge[:, None] * y1
-        ahead = self._jacobians(
-            self._assembled.residuals_and_jacobians(moved[:, :split], moved[:, split:], numbers).entries, split
-        )
+        _, entries = self._assembled.residuals_and_jacobians(moved[:, :split], moved[:, split:], numbers)
+        ahead = self._jacobians(entries, split)
         change = np.linalg.norm((ahead - jacobians) / lengths[:, None], axis=(1, 2)) / nudge
         with np.errstate(invalid="ignore"):
             signs = np.linalg.slogdet(np.nan_to_num(jacobians))[0]

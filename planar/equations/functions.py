@@ -227,7 +227,7 @@ class EquationFunctions:
         if self._row_count == 0:
             return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, u.shape[1]))
         evaluator = self._evaluator(samples)
-        return self._split_entries(evaluator.residuals_and_jacobians(z, u, p).entries, evaluator.pattern)
+        return self._split_entries(evaluator.residuals_and_jacobians(z, u, p)[1], evaluator.pattern)
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""

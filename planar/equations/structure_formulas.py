@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
-from planar.equations.assembled_equations import AssembledEquations, AssembledJacobians
+from planar.equations.assembled_equations import AssembledEquations
 from planar.equations.sparse_matrices import SparsePattern
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
@@ -121,10 +121,10 @@ class StructureFormulas:
         """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
         return self.coordinate_function.evaluate_entries(len(z), z.T, u.T, p.T).T
 
-    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """F and the entries of dF/dy by the pattern at samples."""
         values = self._closing_function.evaluate_entries(len(z), z.T, u.T, p.T).T
-        return AssembledJacobians(values[:, : self._rows], values[:, self._rows :])
+        return values[:, : self._rows], values[:, self._rows :]
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of

@@ -28,7 +28,7 @@ from planar.equations.elimination import (
     stack_expressions,
 )
 from planar.equations.residuals import ConstraintRow, wrapped_residual
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Mechanism, relative_motions
@@ -327,12 +327,10 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
     z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
     with np.errstate(all="ignore"):
-        one, other = (abs(slopes[:, :unknown_count]) for slopes in assembled.derivatives(z, u, p))
         # what grew beyond all numbers, along a long train of wheels, is more than rounding
-        sizes = one + other
-        rows, columns = sizes.nonzero()
-        entries = np.asarray(sizes[rows, columns]).ravel()
-    moved = _moving_columns(sizes.shape[0], rows.tolist(), columns.tolist(), entries[None])
+        _, entries = assembled.residuals_and_jacobians(z, u, p)
+    pattern = assembled.pattern.first_columns(unknown_count)
+    moved = _moving_columns(len(remaining), pattern.rows, pattern.columns, entries[:, : len(pattern.rows)])
 
     def make_expressions() -> ConstraintExpressions:
         return _without_idle_unknowns(_expressions_of(structure, {}), moved)
@@ -537,16 +535,16 @@ def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
     slope = ca.Function("slope", [z, u, p], [jacobian])
     ends = np.cumsum([symbol.numel() for symbol in (z, u, p)])
     slopes = [slope(*np.split(numbers, ends[:2])).nonzeros() for numbers in generic_numbers(2, ends[2])]
-    return _moving_columns(jacobian.size1(), *jacobian.sparsity().get_triplet(), np.array(slopes))
+    rows, columns = np.array(jacobian.sparsity().get_triplet(), dtype=int)
+    return _moving_columns(jacobian.size1(), rows, columns, np.array(slopes))
 
 
-def _moving_columns(row_count: int, rows: Sequence[int], columns: Sequence[int], entries: Array) -> list[set[int]]:
+def _moving_columns(row_count: int, rows: IntArray, columns: IntArray, entries: Array) -> list[set[int]]:
     """For every row the columns whose entries (places, entries) are more than rounding at random places."""
     moving: list[set[int]] = [set() for _ in range(row_count)]
     is_moving = ~(np.abs(entries).sum(axis=0) <= MIN_MOVING_SLOPE)
-    for row, column, is_one in zip(rows, columns, is_moving.tolist(), strict=True):
-        if is_one:
-            moving[row].add(column)
+    for row, column in zip(rows[is_moving].tolist(), columns[is_moving].tolist(), strict=True):
+        moving[row].add(column)
     return moving
 
 
