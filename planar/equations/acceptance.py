@@ -13,8 +13,7 @@ import numpy as np
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import INPUT_BLOCK, PlacedBlock, place_input_coordinates
-from planar.equations.constraint_check import ORDERS, ConstraintCheck
-from planar.equations.coordinates import coordinate_columns
+from planar.equations.constraint_check import ORDERS, constraint_check
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
@@ -96,15 +95,6 @@ class RecordedStep(NamedTuple):
     judged: JudgedPositions
 
 
-class _BlockMotion(NamedTuple):
-    """The coordinates and inputs with their rates (3, entries, samples), what blocks leave open (rows, samples), and
-    of every block the regularity, least singular value, loss by round-off and distance (4, blocks, samples)."""
-
-    entries: Array
-    open_rows: Array
-    judged: Array
-
-
 class AcceptanceFunctions:
     """Computes and judges positions of one structure. Only for structures whose every block is of a type, with as many
     constraints as unknowns."""
@@ -121,6 +111,7 @@ class AcceptanceFunctions:
         self.is_available = functions.is_square and e.elimination is not None and len(self._placed) == len(blocks)
         self.unknown_columns = np.array(e.unknowns, dtype=int)
         "the coordinates that are the unknowns"
+        self.check = constraint_check(structure)
         self.block_starts = np.array([block.unknowns.start for block in e.blocks], dtype=int)
         self._call_count = 0
 
@@ -128,10 +119,6 @@ class AcceptanceFunctions:
     def _blocks(self) -> list[tuple[Block, PlacedBlock, BlockTypeFunctions]]:
         """The blocks in their order, those first that follow from the inputs alone."""
         return [(block, placed, block_type_functions(placed.key)) for block, placed in self._placed]
-
-    @cached_property
-    def _check(self) -> ConstraintCheck:
-        return ConstraintCheck(self.structure, coordinate_columns(self.equations.coordinates))
 
     def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
@@ -146,7 +133,7 @@ class AcceptanceFunctions:
     def judge(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns)."""
         with np.errstate(all="ignore"):  # what is not defined is not a number, and is not accepted
-            return self._judge(self._move(np.array([rates.T for rates in given]), scales, z=z.T), scales)
+            return self._judge_blocks(z.T, np.array([rates.T for rates in given]), scales)
 
     def run(self, z: Array, given: InputSamples, scales: Scales, at: int = 0) -> tuple[Array, JudgedPositions]:
         """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the sample `at`, and
@@ -156,8 +143,9 @@ class AcceptanceFunctions:
             if self.has_one_formula:
                 samples = self._solve_run(z, given.u, scales.p, at)
                 return samples, self._judge_by_one_formula(samples, given, scales)
-            motion = self._move(np.array([rates.T for rates in given]), scales, start=z, at=at)
-            return motion.entries[0, self.unknown_columns].T, self._judge(motion, scales)
+            samples = np.empty((len(given.u), len(z)))
+            rates = np.array([rates.T for rates in given])
+            return samples, self._judge_blocks(samples.T, rates, scales, (z, at))
 
     def _solve_run(self, start: Array, u: Array, p: Array, at: int) -> Array:
         """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start` at one."""
@@ -235,57 +223,44 @@ class AcceptanceFunctions:
         result = AcceptanceResult(*values[split : split + RESULT_COUNT])
         return JudgedPositions(rates, result, values[split + RESULT_COUNT :].T)
 
-    def _move(
-        self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None, at: int = 0
-    ) -> _BlockMotion:
-        """All blocks one after the other, each at all samples: from inputs with their rates (3, inputs, samples), at
-        unknowns z (unknowns, samples), or on the branch of `start` (unknowns,) at one of them."""
-        e, samples = self.equations, u.shape[-1]
-        count = len(e.coordinates)
+    def _judge_blocks(
+        self, z: Array, u: Array, scales: Scales, start: tuple[Array, int] | None = None
+    ) -> JudgedPositions:
+        """All blocks one after the other, each at all samples: at unknowns z (unknowns, samples), and inputs u with
+        their rates (3, inputs, samples). With `start`, unknowns at the sample of that number, z is filled: by those on
+        the branch of them."""
+        count, samples = len(self.equations.coordinates), u.shape[-1]
         entries: Array = np.zeros((ORDERS, count + u.shape[1], samples), u.dtype)
         entries[:, count:] = u
         open_rows: list[Array] = []
-        judged: list[Array] = []
+        bounds: list[Array] = []
         for block, placed, of_type in self._blocks:
             known, numbers = entries[:, placed.known], scales.p[placed.numbers]
-            if z is not None:
-                own = z[block.unknowns]
-            else:
-                assert start is not None
-                own = (
-                    of_type.run(start[block.unknowns], known[0].T, numbers, at).T
-                    if slice_length(block.unknowns)
-                    else known[0, :0]
-                )
-            bounds = scales.row_scale[block.rows], scales.column_floor[block.unknowns]
-            results = of_type.motion.evaluate_entries(samples, own, *known, numbers, *bounds)
+            if start is not None and slice_length(block.unknowns):
+                near, at = start
+                z[block.unknowns] = of_type.run(near[block.unknowns], known[0].T, numbers, at).T
+            sizes = scales.row_scale[block.rows], scales.column_floor[block.unknowns]
+            results = of_type.motion.evaluate_entries(samples, z[block.unknowns], *known, numbers, *sizes)
             split = ORDERS * len(placed.coordinates)
             entries[:, placed.coordinates] = results[:split].reshape(ORDERS, -1, samples)
             if slice_length(block.unknowns):
-                open_rows.append(results[split:-4])
+                open_rows.append(np.abs(results[split:-4]))
             if block is not INPUT_BLOCK:
-                judged.append(results[-4:])
-        return _BlockMotion(
-            entries,
-            np.concatenate([*open_rows, 0.0 * entries[0, :0]]),
-            np.array(judged).reshape(len(judged), 4, samples).swapaxes(0, 1),
-        )
-
-    def _judge(self, motion: _BlockMotion, scales: Scales) -> JudgedPositions:
-        coordinates = motion.entries[:, : len(self.equations.coordinates)]
-        closed = self._check.judge(motion.entries, scales.p)
-        regularity, least, loss, distances = motion.judged
+                bounds.append(results[-4:])
+        regularity, least, loss, distances = np.array(bounds).reshape(len(bounds), 4, samples).swapaxes(0, 1)
+        coordinates = entries[:, :count]
+        residual, finite_sum, velocity_error, acceleration_error, contact_gap = self.check.judge(entries, scales.p)
         size = greatest_entries(np.abs(coordinates[0])) / np.pi
-        of_angles = np.stack([0.0 * size + 1.0, size])
+        one = 0.0 * size + 1.0
         result: AcceptanceResult[Array] = AcceptanceResult(
-            greatest_entries(np.concatenate([np.abs(motion.open_rows), closed.residual[None]])),
-            coordinates.sum(axis=(0, 1)) + closed.finite_sum + (regularity + least).sum(axis=0),
-            closed.velocity_error,
-            closed.acceleration_error,
-            closed.contact_gap,
-            least_entries(np.concatenate([of_angles[:1], regularity])),
-            least_entries(np.concatenate([of_angles[:1], least])),
-            greatest_entries(np.concatenate([of_angles[:1], loss])) * greatest_entries(of_angles),
+            greatest_entries(np.concatenate([*open_rows, residual[None]])),
+            coordinates.sum(axis=(0, 1)) + finite_sum + (regularity + least).sum(axis=0),
+            velocity_error,
+            acceleration_error,
+            contact_gap,
+            least_entries(np.concatenate([one[None], regularity])),
+            least_entries(np.concatenate([one[None], least])),
+            greatest_entries(np.concatenate([one[None], loss])) * greatest_entries(np.stack([one, size])),
         )
         return JudgedPositions(coordinates.transpose(2, 0, 1), result, distances.T)
 
