@@ -169,7 +169,7 @@ class ConstraintEquations:
         return ca.Function("equations", [self.z, self.u, self.p], [self.F, self.w])
 
 
-class _EliminatedStructure(NamedTuple):
+class EliminatedStructure(NamedTuple):
     """A structure's constraints after elimination; `unknowns` are the coordinates that remain, `remaining_rows` the
     rows of all that close them."""
 
@@ -209,17 +209,10 @@ def _is_overdetermined(equations: ConstraintEquations) -> bool:
     return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
 
 
-class _ElementsOfStructure(NamedTuple):
-    """The elements of a structure with its coordinates, all rows, and how many numbers there are."""
-
-    elements: tuple[PlacedElement, ...]
-    coordinates: tuple[Coordinate, ...]
-    rows: tuple[ConstraintRow, ...]
-    number_count: int
-
-
-def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Sequence[Pair]) -> _ElementsOfStructure:
-    """The elements of all pairs, then those of the inputs."""
+def _place_elements(
+    mechanism: Mechanism, given_links: Sequence[str], driven: Sequence[Pair]
+) -> tuple[tuple[PlacedElement, ...], tuple[Coordinate, ...], tuple[ConstraintRow, ...], int]:
+    """The elements of pairs, then those of inputs; the coordinates, the rows, and how many numbers there are."""
     coordinates: list[Coordinate] = []
     frame_columns: dict[str, range] = {}
     for link in mechanism.links:
@@ -245,10 +238,10 @@ def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Se
     for motion in driven:
         elements.append(placement.input_position_of(motion, len(rows)))
         rows.append(ConstraintRow(motion.name, motion.input_kind))
-    return _ElementsOfStructure(tuple(elements), tuple(coordinates), tuple(rows), sum(number_counts.values()))
+    return tuple(elements), tuple(coordinates), tuple(rows), sum(number_counts.values())
 
 
-def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:
+def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> EliminatedStructure:
     """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
     motions = relative_motions(mechanism)
     driven = [motions[given.pair] for given in mechanism.inputs]
@@ -288,7 +281,7 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
         len(input_kinds),
         number_count,
     )
-    return _EliminatedStructure(
+    return EliminatedStructure(
         mechanism,
         coordinates,
         rows,
@@ -313,7 +306,7 @@ def _elimination_rows(elements: Sequence[PlacedElement]) -> list[EliminationRow]
     return lines
 
 
-def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquations:
+def _assembled_equations_of(structure: EliminatedStructure) -> ConstraintEquations:
     """The equations of a structure, their blocks found by numbers at random places.
 
     What cancels in a sum shows in numbers only: an entry of the Jacobian that vanishes at random places is none. Left
@@ -349,7 +342,7 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
-def _expressions_of(structure: _EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
+def _expressions_of(structure: EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
     """F and w as expressions, in the order in which elimination leaves them; some rows stay open by their misfits."""
     return expressions_of_elimination(
         structure.elimination,
@@ -419,10 +412,12 @@ def _without_idle_unknowns(expressions: ConstraintExpressions, moved: Sequence[s
     return ConstraintExpressions(z, u, p, both[row_count:], both[:row_count])
 
 
-def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
+def _least_misfit_equations_of(structure: EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
     """The equations of the position of least misfit, in which some rows of pairs may stay open."""
+    from planar.equations.least_misfit import least_misfit_equations  # few pairs may stay open
+
     misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
-    equations = _with_least_misfit(structure, _expressions_of(structure, misfits), misfits)
+    equations = least_misfit_equations(structure, _expressions_of(structure, misfits), misfits)
     expressions = equations.expressions
     moved = _moving_unknowns(expressions)
     equations = replace(equations, make_expressions=lambda: _without_idle_unknowns(expressions, moved))
@@ -434,46 +429,8 @@ def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Seque
     return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
-def _with_least_misfit(
-    structure: _EliminatedStructure, expressions: ConstraintExpressions, misfits: Mapping[int, ca.SX]
-) -> ConstraintEquations:
-    """Equations whose rows may stay open by their misfits, made those of the position of least misfit."""
-    from planar.equations.misfits.least_misfit import HELD, UNRELATED, least_misfit_equations  # few pairs may stay open
-
-    z, u, p, w, F = expressions
-    rows, remaining_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
-    loose = {column for group in structure.groups if misfits.keys() & set(group.rows) for column in group.columns}
-    tied = [k for k, column in enumerate(unknowns) if column in loose]
-    system = least_misfit_equations(ca.vertcat(F, w), z, remaining_rows, misfits, tied)
-    first = len(structure.coordinates)
-    added = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
-    added += [Coordinate(rows[remaining_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in system.held]
-    column_of = {row: first + k for k, row in enumerate(misfits)}
-    names = [rows[row].pair for row in remaining_rows if row in misfits] or [rows[row].pair for row in misfits]
-    labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
-    labels += [rows[row] for row in system.free]
-    labels += [rows[remaining_rows[k]] for k in (*system.held, *system.unrelated)]
-    untied = [k for k in range(len(unknowns)) if k not in {*tied}]
-    variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in system.free)]
-    multipliers = range(first + len(misfits), first + len(added))
-    all_unknowns = ca.vertcat(system.unknowns, *(z[k] for k in untied))
-    with_misfits = ConstraintExpressions(all_unknowns, u, ca.vertcat(p, system.weights), system.w, system.F)
-    return ConstraintEquations(
-        coordinates=(*structure.coordinates, *added),
-        unknowns=(*variables, *multipliers, *(unknowns[k] for k in untied)),
-        rows=tuple(labels),
-        blocks=(),
-        known_after_block=(),
-        input_kinds=structure.input_kinds,
-        make_expressions=lambda: with_misfits,
-        open_rows=tuple(misfits),
-        misfit_columns=tuple(column_of.values()),
-        row_variables=(*variables, *([HELD] * len(system.held)), *([UNRELATED] * len(system.unrelated))),
-    )
-
-
 def _split_into_blocks(
-    structure: _EliminatedStructure,
+    structure: EliminatedStructure,
     equations: ConstraintEquations,
     moved: Sequence[set[int]],
     coordinate_levels: Callable[[Mapping[int, int]], tuple[int, ...]],
