@@ -9,18 +9,17 @@ from __future__ import annotations
 import json
 from functools import cached_property, lru_cache
 from math import inf, isfinite, remainder
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
 from planar.equations.elements import known_text
-from planar.equations.linear import solve_vectors
-from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies
+from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies, polish
 from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
-from planar.foundation.arrays import Array, greatest_size
+from planar.foundation.arrays import Array
 from planar.foundation.jets import TURN
 from planar.foundation.recorded_formula import (
     RecordedFormula,
@@ -30,19 +29,15 @@ from planar.foundation.recorded_formula import (
 )
 from planar.model.pairs import MeasureKind
 
+if TYPE_CHECKING:
+    from planar.equations.block_motion import LargeBlockMotion
+
 MAX_RUN_STEPS = 6
 """Steps of Newton's method at a position of a run."""
 
 
 MAX_FORMULA_UNKNOWNS = 12
 """Unknowns of a block: the formula of the motion of a larger one would be too long."""
-
-
-class BlockMotionFunction(Protocol):
-    """The motion of a block type."""
-
-    def evaluate_entries(self, count: int, *arguments: Array) -> Array:
-        """See `FormulaFunction.evaluate_entries`."""
 
 
 class BlockTypeFormulas(NamedTuple):
@@ -76,12 +71,10 @@ def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
 
     equations = block_equations(key)
     formulas = StructureFormulas(equations)
-    form = closed_form_formula(equations, equations.blocks[0])
     return BlockTypeFormulas(
         formulas.block_function(equations.blocks[0]).formula,
         formulas.coordinate_function.formula,
-        form and form.formula,
-        form is not None and form.has_changing_arm,
+        *closed_form_formula(equations, equations.blocks[0]),
     )
 
 
@@ -112,15 +105,19 @@ class BlockTypeFunctions:
         return FormulaFunction(self._formulas.coordinates, self._counts, ((1, len(self._key.own_kinds)),))
 
     @cached_property
-    def motion(self) -> BlockMotionFunction:
+    def motion(self) -> FormulaFunction | LargeBlockMotion:
         """(unknowns, known coordinates with first and second rates, numbers, row scale, column floor): see
         `block_motion`."""
         unknowns, known, numbers = self._counts
-        if unknowns > MAX_FORMULA_UNKNOWNS:
-            from planar.equations.block_motion import LargeBlockMotion  # few blocks are so large
+        text = known_text(motion_fingerprint(self._key))
+        if text is not None:
+            formula = RecordedFormula.from_text(text)
+        else:
+            from planar.equations.block_motion import LargeBlockMotion, derive_block_motion  # most types are known
 
-            return LargeBlockMotion(block_equations(self._key))
-        formula = block_motion_formula(self._key)
+            if unknowns > MAX_FORMULA_UNKNOWNS:
+                return LargeBlockMotion(block_equations(self._key))
+            formula = derive_block_motion(block_equations(self._key))
         counts = unknowns, known, known, known, numbers, len(self._key.row_kinds), unknowns
         return FormulaFunction(formula, counts, ((1, len(formula.results)),))
 
@@ -151,7 +148,7 @@ class BlockTypeFunctions:
         turned = np.cumsum(wrap_angle(np.diff(angles, axis=0, prepend=angles[:1])), axis=0)
         samples[:, is_angle] = z[is_angle] + wrap_angle(angles[at] - z[is_angle]) + (turned - turned[at])
         if (np.abs(steps) > SETTLED_STEP).any():
-            self.assemblies.polish(samples, known, numbers)
+            polish(self.closing, samples, known, numbers)
         return samples
 
     def nearest_sign(self, z: Array, known: Array, numbers: Array) -> float:
@@ -189,37 +186,20 @@ class BlockTypeFunctions:
         """By Newton's method from where the samples before lead."""
         samples: Array = np.empty((len(known), len(z)))
 
-        def corrected(z: Array, coordinates: Array) -> Array:
-            for _ in range(MAX_RUN_STEPS):
-                residuals, columns = self.closing(z, coordinates, numbers)
-                move = solve_vectors(columns.T[None], residuals)[0]
-                z = z - move
-                if not greatest_size(move) > SETTLED_STEP:
-                    break
-            return z
-
-        samples[at] = corrected(z, known[at])
+        samples[at] = z
+        polish(self.closing, samples[at : at + 1], known[at], numbers, steps=MAX_RUN_STEPS)
         for rows in (range(at + 1, len(known)), range(at - 1, -1, -1)):
-            here, step = samples[at], np.zeros(len(z))
+            previous, step = samples[at], np.zeros(len(z))
             for k in rows:
-                samples[k] = corrected(here + step, known[k])
-                here, step = samples[k], samples[k] - here
+                samples[k] = previous + step
+                polish(self.closing, samples[k : k + 1], known[k], numbers, steps=MAX_RUN_STEPS)
+                previous, step = samples[k], samples[k] - previous
         return samples
 
 
 def motion_fingerprint(key: BlockTypeKey) -> str:
     """What tells the motion of a type from all other formulas."""
     return f"{key.fingerprint} motion"
-
-
-def block_motion_formula(key: BlockTypeKey) -> RecordedFormula:
-    """The motion of a block type, known or derived."""
-    text = known_text(motion_fingerprint(key))
-    if text is not None:
-        return RecordedFormula.from_text(text)
-    from planar.equations.block_motion import derive_block_motion  # most types are known
-
-    return derive_block_motion(block_equations(key))
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)

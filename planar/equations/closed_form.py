@@ -21,7 +21,7 @@ import numpy as np
 from planar.equations.casadi_call import formula_text
 from planar.equations.elimination import stack_expressions
 from planar.equations.generic_evaluation import recorded_function
-from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
+from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.recorded_formula import RecordedFormula
@@ -36,8 +36,8 @@ SAMPLE_POINTS = 3
 class ClosedForm(NamedTuple):
     """One block in closed form, as expressions in the symbols of its equations and in `sign`.
 
-    `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
-    or -1, which of the two assemblies; `side`: an expression in all unknowns that has this sign; `bend`: 0 to 1, where
+    `values`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
+    or -1, which of the two assemblies; `sign_expression`: in all unknowns, has this sign; `coalescence`: 0 to 1, where
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
     `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None.
     `squared_lengths` (2,): of the Jacobian's columns.
@@ -49,16 +49,6 @@ class ClosedForm(NamedTuple):
     coalescence: ca.SX
     squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
-
-
-class ClosedFormFormula(NamedTuple):
-    """The formula (z, u, p, sign) of a block's unknowns in closed form, then of where its assemblies meet.
-
-    `has_changing_arm`: whether a length turns on an arm that changes as the mechanism moves.
-    """
-
-    formula: RecordedFormula
-    has_changing_arm: bool
 
 
 class _ComplexNumber(NamedTuple):
@@ -105,39 +95,36 @@ class _DerivedForm(NamedTuple):
     part_counts: tuple[int, ...]
     has_arm: bool
 
-    def form_of(self, unknowns: ca.SX, others: ca.SX) -> ClosedForm:
-        """The form of these unknowns where these symbols stand in its rows."""
-        sign = ca.SX.sym("sign")
-        *found, lengths, arm = self.function(unknowns, others, sign)
-        parts = iter(found)
-        values = tuple(tuple(next(parts) for _ in range(count)) for count in self.part_counts)
-        side, coalescence = parts
-        return ClosedForm(values, sign, side, coalescence, lengths, arm if self.has_arm else None)
-
 
 def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     """The closed form of a block; None where it has none of the three forms."""
-    if stage.is_free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
+    if stage.is_free or not slice_length(stage.rows) == slice_length(stage.unknowns) == 2:
         return None
     angles = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns])
-    if not any(angles) or any(
-        e.rows[row].kind is MeasureKind.ANGLE for row in range(stage.rows.start, stage.rows.stop)
-    ):
+    if not any(angles) or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None
     rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
     others = ca.vertcat(ca.SX(0, 1), *(each for each in ca.symvar(rows) if not ca.depends_on(unknowns, each)))
     derived = _derive_form(formula_text(rows, unknowns, others), angles)
-    return derived and derived.form_of(unknowns, others)
+    if derived is None:
+        return None
+    sign = ca.SX.sym("sign")
+    *results, lengths, arm = derived.function(unknowns, others, sign)
+    parts = iter(results)
+    values = tuple(tuple(next(parts) for _ in range(count)) for count in derived.part_counts)
+    side, coalescence = parts
+    return ClosedForm(values, sign, side, coalescence, lengths, arm if derived.has_arm else None)
 
 
-def closed_form_formula(e: ConstraintEquations, block: Block) -> ClosedFormFormula | None:
-    """The closed form of a block as a formula; None where it has none."""
+def closed_form_formula(e: ConstraintEquations, block: Block) -> tuple[RecordedFormula | None, bool]:
+    """The formula (z, u, p, sign) of a block's unknowns in closed form, then of where its assemblies meet, None where
+    it has none; and whether a length turns on an arm that changes as the mechanism moves."""
     form = find_closed_form(e, block)
     if form is None:
-        return None
-    values = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
+        return None, False
+    values = stack_expressions(ca.atan2(*parts[::-1]) if len(parts) == 2 else parts[0] for parts in form.values)
     function = ca.Function("form", [e.z, e.u, e.p, form.sign], [ca.densify(values), form.coalescence])
-    return ClosedFormFormula(recorded_function(function), form.squared_arm is not None)
+    return recorded_function(function), form.squared_arm is not None
 
 
 @lru_cache(maxsize=1024)

@@ -132,12 +132,12 @@ class EquationFunctions:
         from planar.equations.closed_form import closed_form_formula  # nearly all blocks have a type
 
         e = self.equations
-        derived = closed_form_formula(e, block)
-        if derived is None:
+        formula, has_changing_arm = closed_form_formula(e, block)
+        if formula is None:
             return None
         shapes = (1, slice_length(block.unknowns)), (1, 1)
-        function = FormulaFunction(derived.formula, (*e.argument_counts, 1), shapes)
-        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), derived.has_changing_arm)
+        function = FormulaFunction(formula, (*e.argument_counts, 1), shapes)
+        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), has_changing_arm)
 
     def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""

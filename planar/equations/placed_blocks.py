@@ -32,6 +32,20 @@ class BlockCall(Protocol):
         """The results (positions, columns, rows); arguments (positions, entries), or (entries,) for all alike."""
 
 
+def polish(
+    closing: BlockCall, z: Array, u: Array, p: Array, unknowns: slice = slice(None), steps: int = POLISHING_STEPS
+) -> None:
+    """Carry a block's unknowns in z (designs, unknowns) to round-off by Newton's method; `closing` gives its F and the
+    columns of its Jacobian."""
+    for _ in range(steps):
+        residuals, columns = closing.evaluate_batch(len(z), z, u, p)
+        with np.errstate(all="ignore"):  # what is not there is not a number
+            moves = solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+            z[:, unknowns] -= moves
+            if not (np.abs(moves) > SETTLED_STEP).any():
+                break
+
+
 BlockArguments = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
 """z, u and p of the structure to what the functions of a block take."""
 
@@ -89,23 +103,13 @@ class ClosedFormAssemblies:
         for assembly in both:
             tried = z.copy()
             tried[:, self._unknowns] = assembly
-            self.polish(tried, u, p)
+            polish(self._closing, tried, u, p, self._unknowns)
             residual = np.abs(self._closing.evaluate_batch(len(z), tried, u, p)[0][:, 0]).max(axis=1)
             # the greatest of what is left open does not see what is not a number
             is_defined = np.isfinite(tried[:, self._unknowns]).all(axis=1)
             greatest = np.maximum(greatest, np.where(is_defined, residual, np.nan))
             assemblies.append(tried[:, self._unknowns])
         return np.array(assemblies), greatest, coalescence
-
-    def polish(self, z: Array, u: Array, p: Array) -> None:
-        """Carry the block's unknowns in z (designs, unknowns) to round-off."""
-        for _ in range(POLISHING_STEPS):
-            residuals, columns = self._closing.evaluate_batch(len(z), z, u, p)
-            with np.errstate(all="ignore"):  # what is not there is not a number
-                moves = solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
-                z[:, self._unknowns] -= moves
-                if not (np.abs(moves) > SETTLED_STEP).any():
-                    break
 
 
 class PlacedBlockCall:
