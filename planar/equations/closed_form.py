@@ -20,8 +20,8 @@ import numpy as np
 
 from planar.equations.casadi_call import formula_text
 from planar.equations.elimination import stack_expressions
-from planar.equations.generic_evaluation import recorded_function
-from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in, slice_length
+from planar.equations.generic_evaluation import is_piecewise_in, recorded_function
+from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.recorded_formula import RecordedFormula

@@ -503,21 +503,3 @@ def _moving_columns(row_count: int, rows: IntArray, columns: IntArray, entries: 
     for row, column in zip(rows[is_moving].tolist(), columns[is_moving].tolist(), strict=True):
         moving[row].add(column)
     return moving
-
-
-def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:
-    """Whether an expression changes its formula as these symbols change."""
-    others = [each for each in ca.symvar(expression) if not ca.depends_on(symbols, each)]
-    function = ca.Function("pieces", [symbols, ca.vertcat(ca.SX(0, 1), *others)], [expression])
-    depends: dict[int, bool] = {}
-    for k in range(function.n_instructions()):
-        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        if code == ca.OP_INPUT:
-            depends[out[0]] = of[0] == 0
-        elif code == ca.OP_CONST:
-            depends[out[0]] = False
-        elif code != ca.OP_OUTPUT:
-            depends[out[0]] = any(depends[each] for each in of)
-            if depends[out[0]] and code in (ca.OP_FLOOR, ca.OP_LT, ca.OP_LE):
-                return True
-    return False
