@@ -42,24 +42,19 @@ def compile_kernel(formula: RecordedFormula, argument_counts: Sequence[int], var
             still += keys
     _write_rows(writer, formula, varying, still, list(zip(formula.results)))
     run = compile_function(writer.module_text(), "run", "int", "int", *["array"] * 3)
-    varying_count = sum(count for count, is_varying in zip(argument_counts, varies, strict=True) if is_varying)
-    still_count = sum(argument_counts) - varying_count
-    result_count = len(formula.results)
 
     def evaluate(count: int, arguments: Sequence[Array]) -> Array:
         stride = -(-count // LANES) * LANES
-        varying, still = np.empty((varying_count, stride)), np.empty(still_count)
-        row = place = 0
+        rows = np.empty((len(varying), stride))
+        numbers = np.empty(len(still))
+        parts: tuple[list[Array], list[Array]] = [numbers[:0]], [rows[:0, :count]]
         for argument, is_varying in zip(arguments, varies, strict=True):
-            if is_varying:
-                varying[row : row + len(argument), :count] = argument
-                row += len(argument)
-            else:
-                still[place : place + len(argument)] = argument
-                place += len(argument)
-        results: Array = np.empty((result_count, stride))
+            parts[is_varying].append(argument)
+        np.concatenate(parts[0], out=numbers)
+        np.concatenate(parts[1], out=rows[:, :count])
+        results: Array = np.empty((len(formula.results), stride))
         if count:
-            run(stride // LANES, stride, *(array.ctypes.data for array in (varying, still, results)))
+            run(stride // LANES, stride, *(array.ctypes.data for array in (rows, numbers, results)))
         return results[:, :count]
 
     return evaluate

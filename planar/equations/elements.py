@@ -38,15 +38,15 @@ PairFormula = Callable[[Sequence[Frame], Sequence[Scalar], Sequence[Scalar]], Se
 MAX_ELEMENTS = 1024
 
 
+def fingerprint(*parts: object) -> str:
+    """What tells a type that is derived from these parts from others, in every process."""
+    return sha256(repr(parts).encode()).hexdigest()[:FINGERPRINT_LENGTH]
+
+
 @cache
 def _texts() -> dict[str, str]:
     """All texts by their fingerprints."""
     return dict(line.split("\t", 1) for line in read_package_text(KNOWN_TYPES_FILE).splitlines())
-
-
-def fingerprint(*parts: object) -> str:
-    """What tells a type that is derived from these parts from others, in every process."""
-    return sha256(repr(parts).encode()).hexdigest()[:FINGERPRINT_LENGTH]
 
 
 def known_text(type_fingerprint: str) -> str | None:
@@ -56,13 +56,7 @@ def known_text(type_fingerprint: str) -> str | None:
 
 def pair_formula(pair: Pair, is_input: bool) -> PairFormula:
     """The residual of a pair, or with `is_input` the position of its relative motion."""
-    if not is_input:
-        return pair.residual
-
-    def position(frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
-        return (pair.input_position(frames, numbers, own),)
-
-    return position
+    return (lambda *arguments: (pair.input_position(*arguments),)) if is_input else pair.residual
 
 
 def recorded_pair_formula(
@@ -75,27 +69,25 @@ def recorded_pair_formula(
     try:
         hash(pair)
     except TypeError:  # made in Python, of lists
-        return _record(pair, is_input, is_moving, own_count, number_count)
-    return _cached_record(pair, is_input, is_moving, own_count, number_count)
+        return _record.__wrapped__(pair, is_input, is_moving, own_count, number_count)
+    return _record(pair, is_input, is_moving, own_count, number_count)
 
 
+@lru_cache(maxsize=MAX_RECORDED_PAIRS)
 def _record(
     pair: Pair, is_input: bool, is_moving: tuple[bool, ...], own_count: int, number_count: int
 ) -> RecordedFormula:
     moving = [link for link, moves in zip(pair.bodies, is_moving, strict=True) if moves]
-    frames_end = PARTS_OF_FRAME * len(moving)
-    own_end = frames_end + own_count
+    own_start = PARTS_OF_FRAME * len(moving)
+    own_end = own_start + own_count
 
     def recorded(arguments: Sequence[RecordedNumber]) -> Sequence[Scalar]:
-        parts = (arguments[k : k + PARTS_OF_FRAME] for k in range(0, frames_end, PARTS_OF_FRAME))
+        parts = (arguments[k : k + PARTS_OF_FRAME] for k in range(0, own_start, PARTS_OF_FRAME))
         frames = {link: Frame(x, y, c, s, angle) for link, (x, y, c, s, angle) in zip(moving, parts, strict=True)}
         bodies = [frames.get(link, GROUND) for link in pair.bodies]
-        return pair_formula(pair, is_input)(bodies, arguments[own_end:], arguments[frames_end:own_end])
+        return pair_formula(pair, is_input)(bodies, arguments[own_end:], arguments[own_start:own_end])
 
     return record_formula(recorded, own_end + number_count)
-
-
-_cached_record = lru_cache(maxsize=MAX_RECORDED_PAIRS)(_record)
 
 
 class ElementKey(NamedTuple):

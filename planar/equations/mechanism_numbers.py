@@ -49,16 +49,13 @@ def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_sli
 
 def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
-    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
-    return pair_numbers_from(mechanism, measured, unit)
+    return np.array([number for pair in mechanism.pairs for number in scaled_pair_numbers(pair, shapes, unit)], float)
 
 
 def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
     """p from the numbers of every pair, lengths divided by `unit`."""
-    found: list[float] = []
-    for pair in mechanism.pairs:
-        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
-    return np.array(found, dtype=float)
+    scaled = (scale_lengths(numbers[pair.name], pair.number_kinds, unit) for pair in mechanism.pairs)
+    return np.array([number for part in scaled for number in part], dtype=float)
 
 
 def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: Scalar) -> list[Scalar]:
