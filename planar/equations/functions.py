@@ -63,9 +63,9 @@ class EquationFunctions:
 
     def __init__(self, equations: ConstraintEquations):
         self.equations = equations
-        self._unknown_count, self._row_count = len(equations.unknowns), len(equations.rows)
-        is_square = equations.is_square and self._unknown_count == self._row_count
-        self.is_sparse = is_square and self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
+        self._unknown_count = len(equations.unknowns)
+        is_large = self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
+        self.is_sparse = is_large and equations.is_square
         "whether Jacobians are by their entries"
         self._evaluation_count = 0.0
         self._block_calls: dict[int, BlockCall] = {}
@@ -223,16 +223,11 @@ class EquationFunctions:
 
     def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
-        samples, unknowns = z.shape
-        if self._row_count == 0:
-            return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, u.shape[1]))
-        evaluator = self._evaluator(samples)
+        evaluator = self._evaluator(len(z))
         return self._split_entries(evaluator.residuals_and_jacobians(z, u, p)[1], evaluator.pattern)
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
-        if not len(self.equations.rows):
-            return np.zeros(0), np.zeros((0, len(z) + len(u)))
         evaluator = self._evaluator()
         residuals, entries = evaluator.residuals_and_jacobians(z[None], u[None], p)
         jacobian = SparseMatrices(evaluator.pattern, entries[0])
