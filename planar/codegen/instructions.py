@@ -33,7 +33,7 @@ class CosSin(NamedTuple):
 
 
 def expand_angle_sums(
-    listing: InstructionList[Key], wanted: list[int], angles: Mapping[int, CosSin]
+    listing: InstructionList[Key], results: list[int], angles: Mapping[int, CosSin]
 ) -> tuple[InstructionList[Key], list[int]]:
     """The same values with no cos and sin of known angles in them: these are put together from the angles' own.
 
@@ -41,7 +41,7 @@ def expand_angle_sums(
     keep their own values.
     """
     turning = _AngleSumExpander(listing, angles)
-    numbers = turning.rebuild(wanted)
+    numbers = turning.rebuild(results)
     return turning.result, numbers
 
 
@@ -61,19 +61,19 @@ class _AngleSumExpander(Generic[Key]):
         self.new_numbers: dict[int, int] = {}
         self.sums: dict[int, _AngleSum | None] = {}
 
-    def rebuild(self, wanted: Sequence[int]) -> list[int]:
+    def rebuild(self, results: Sequence[int]) -> list[int]:
         """The numbers of wanted values in what is made."""
-        for each in required_values(
-            self.source, [*wanted, *(part for turned in self.angles.values() for part in turned)]
+        for number in required_values(
+            self.source, [*results, *(part for turned in self.angles.values() for part in turned)]
         ):
-            value = self.source.instructions[each]
-            self.sums[each] = self._angle_sum(each, value)
+            value = self.source.instructions[number]
+            self.sums[number] = self._angle_sum(number, value)
             inside = self.sums[value.operands[0]] if value.operands else None
             if value.operation in ("cos", "sin") and inside is not None and inside.factors:
-                self.new_numbers[each] = getattr(self._cos_sin_of_sum(inside), value.operation)
+                self.new_numbers[number] = getattr(self._cos_sin_of_sum(inside), value.operation)
             else:
-                self.new_numbers[each] = self.result.add_again(value, (self.new_numbers[k] for k in value.operands))
-        return [self.new_numbers[each] for each in wanted]
+                self.new_numbers[number] = self.result.add_again(value, (self.new_numbers[k] for k in value.operands))
+        return [self.new_numbers[number] for number in results]
 
     def _cos_sin_of_sum(self, inside: _AngleSum) -> CosSin:
         made = self.result
@@ -90,9 +90,9 @@ class _AngleSumExpander(Generic[Key]):
                 )
         return CosSin(c, s)
 
-    def _angle_sum(self, each: int, value: Instruction[Key]) -> _AngleSum | None:
-        if each in self.angles:
-            return _AngleSum({each: 1}, None)
+    def _angle_sum(self, number: int, value: Instruction[Key]) -> _AngleSum | None:
+        if number in self.angles:
+            return _AngleSum({number: 1}, None)
         of = [part for k in value.operands if (part := self.sums[k]) is not None]
         if len(of) < len(value.operands):
             return None
@@ -103,8 +103,10 @@ class _AngleSumExpander(Generic[Key]):
         if value.operation == "neg":
             return self._scale_sum(of[0], -1)
         known = [(self.source.constant_value(k), other) for k, other in zip(value.operands, of[::-1], strict=True)]
-        whole = [(other, int(times)) for times, other in known if value.operation == "mul" and times in ANGLE_MULTIPLES]
-        return self._scale_sum(*whole[0]) if whole else None
+        multiples = [
+            (other, int(times)) for times, other in known if value.operation == "mul" and times in ANGLE_MULTIPLES
+        ]
+        return self._scale_sum(*multiples[0]) if multiples else None
 
     def _scale_sum(self, part: _AngleSum, times: int) -> _AngleSum:
         rest = None if part.rest is None else self.result.add("mul", self.result.add_constant(times), part.rest)
@@ -137,19 +139,19 @@ class InvariantHoister(Generic[Key]):
         self.divided: Counter[int] = Counter()
         "how many values of the listing are divided by each"
 
-    def rebuild(self, listing: InstructionList[Key], wanted: Sequence[int]) -> list[int]:
+    def rebuild(self, listing: InstructionList[Key], results: Sequence[int]) -> list[int]:
         """The numbers of the wanted values in the listing that is made."""
         self.linear_forms, self.value_numbers = {}, {}
-        order = required_values(listing, wanted)
-        uses = Counter(each for k in order for each in listing.instructions[k].operands)
+        order = required_values(listing, results)
+        uses = Counter(operand for k in order for operand in listing.instructions[k].operands)
         values = [listing.instructions[k] for k in order]
         self.divided = Counter(value.operands[1] for value in values if value.operation == "div")
         for k in order:
-            found = self._linear_form(listing.instructions[k])
-            if uses[k] > 1 and (len(found.factors) > MAX_REUSED_TERMS or self._computed_term_count(found) > 1):
-                found = self._single_term(self._write_form(found))
-            self.linear_forms[k] = found
-        return [self._value_number(k) for k in wanted]
+            form = self._linear_form(listing.instructions[k])
+            if uses[k] > 1 and (len(form.factors) > MAX_REUSED_TERMS or self._computed_term_count(form) > 1):
+                form = self._single_term(self._write_form(form))
+            self.linear_forms[k] = form
+        return [self._value_number(k) for k in results]
 
     def _linear_form(self, value: Instruction[Key]) -> _LinearForm:
         of = [self.linear_forms[k] for k in value.operands]

@@ -25,10 +25,10 @@ WIDEST_VECTOR_BYTES = 64
 
 def allocate_aligned(steps: int, rows: int, designs: int, dtype: DTypeLike = np.float64) -> Array:
     """An array (steps, rows, designs), not filled, every row of which begins at a whole vector."""
-    many = WIDEST_VECTOR_BYTES // np.dtype(dtype).itemsize
-    width = -(-designs // many) * many
-    made = np.empty(steps * rows * width + many, dtype)
-    first = -(made.ctypes.data // made.itemsize) % many
+    lanes = WIDEST_VECTOR_BYTES // np.dtype(dtype).itemsize
+    width = -(-designs // lanes) * lanes
+    made = np.empty(steps * rows * width + lanes, dtype)
+    first = -(made.ctypes.data // made.itemsize) % lanes
     return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
 
 
@@ -116,8 +116,8 @@ def _compile_object(text: str) -> bytes:
 
 def _load_object(code: bytes) -> Any:
     """Machine code ready to run; LLVM does not look whether it is any."""
-    held = llvm.ObjectFileRef.from_data(code)
+    object_file = llvm.ObjectFileRef.from_data(code)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine(CODEGEN_LEVEL))
-    engine.add_object_file(held)
+    engine.add_object_file(object_file)
     engine.finalize_object()
     return engine

@@ -120,34 +120,34 @@ class AcceptanceFunctions:
         """The blocks in their order, those first that follow from the inputs alone."""
         return [(block, placed, block_type_functions(placed.key)) for block, placed in self._placed]
 
-    def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
+    def position(self, z: Array, inputs: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
         self._call_count += 1
         if self.has_one_formula:
-            values = self._fused_position.values(*(argument.tolist() for argument in (z, *given, *scales)))
+            values = self._fused_position.values(*(argument.tolist() for argument in (z, *inputs, *scales)))
             split = ORDERS * len(self.equations.coordinates)
             return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split : split + RESULT_COUNT])
-        judged = self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales)
+        judged = self.judge(z[None], InputSamples(*(rates[None] for rates in inputs)), scales)
         return judged.coordinate_rates[0], AcceptanceResult(*(float(values[0]) for values in judged.result))
 
-    def judge(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
+    def judge(self, z: Array, inputs: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns)."""
         with np.errstate(all="ignore"):  # what is not defined is not a number, and is not accepted
-            return self._judge_blocks(z.T, np.array([rates.T for rates in given]), scales)
+            return self._judge_blocks(z.T, np.array([rates.T for rates in inputs]), scales)
 
-    def run(self, z: Array, given: InputSamples, scales: Scales, at: int = 0) -> tuple[Array, JudgedPositions]:
+    def run(self, z: Array, inputs: InputSamples, scales: Scales, index: int = 0) -> tuple[Array, JudgedPositions]:
         """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the sample `at`, and
         what is judged of them."""
         self._call_count += 1
         with np.errstate(all="ignore"):
             if self.has_one_formula:
-                samples = self._solve_run(z, given.u, scales.p, at)
-                return samples, self._judge_by_one_formula(samples, given, scales)
-            samples = np.empty((len(given.u), len(z)))
-            rates = np.array([rates.T for rates in given])
-            return samples, self._judge_blocks(samples.T, rates, scales, (z, at))
+                samples = self._solve_run(z, inputs.u, scales.p, index)
+                return samples, self._judge_by_one_formula(samples, inputs, scales)
+            samples = np.empty((len(inputs.u), len(z)))
+            rates = np.array([rates.T for rates in inputs])
+            return samples, self._judge_blocks(samples.T, rates, scales, (z, index))
 
-    def _solve_run(self, start: Array, u: Array, p: Array, at: int) -> Array:
+    def _solve_run(self, start: Array, u: Array, p: Array, index: int) -> Array:
         """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start` at one."""
         count = len(self.equations.coordinates)
         entries: Array = np.empty((len(u), count + u.shape[1]))
@@ -155,12 +155,12 @@ class AcceptanceFunctions:
         last = self._blocks[-1][0]
         for block, placed, of_type in self._blocks:
             known, numbers = entries[:, placed.known], p[placed.numbers]
-            own = known[:, :0]
+            unknowns = known[:, :0]
             if slice_length(block.unknowns):
-                own = of_type.run(start[block.unknowns], known, numbers, at)
-                entries[:, self.unknown_columns[block.unknowns]] = own
+                unknowns = of_type.run(start[block.unknowns], known, numbers, index)
+                entries[:, self.unknown_columns[block.unknowns]] = unknowns
             if block is not last:  # nothing follows from its coordinates
-                (coordinates,) = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)
+                (coordinates,) = of_type.coordinates.evaluate_batch(len(u), unknowns, known, numbers)
                 entries[:, placed.coordinates] = coordinates[:, 0]
         return entries[:, self.unknown_columns]
 
@@ -186,12 +186,12 @@ class AcceptanceFunctions:
         assert e.elimination is not None
         return e.elimination.number_count, len(e.rows), len(e.unknowns)
 
-    def record_step(self, signs: Array, near: Array, given: InputSamples, scales: Scales) -> RecordedStep:
+    def record_step(self, signs: Array, near: Array, inputs: InputSamples, scales: Scales) -> RecordedStep:
         """The formula of the position at inputs, blocks in closed form by their signs (blocks,), angles within half a
         turn of those `near` (unknowns,): all of it recorded numbers."""
         e = self.equations
-        entries: Array = np.zeros(len(e.coordinates) + len(given.u), dtype=object)
-        entries[len(e.coordinates) :] = given.u
+        entries: Array = np.zeros(len(e.coordinates) + len(inputs.u), dtype=object)
+        entries[len(e.coordinates) :] = inputs.u
         z, moves = near.copy(), near.copy()
         for k, (block, placed, of_type) in enumerate(self._blocks):
             known, numbers = entries[placed.known], scales.p[placed.numbers]
@@ -203,7 +203,7 @@ class AcceptanceFunctions:
                 z[block.unknowns] = np.where(of_type.is_angle, unknowns + wrap_angle(move), assembly)
             coordinates = of_type.coordinates.evaluate_entries(1, z[block.unknowns], known, numbers)
             entries[placed.coordinates] = coordinates[:, 0]
-        return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales))
+        return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in inputs)), scales))
 
     def signs_at(self, coordinates: Array, u: Array, p: Array) -> list[float]:
         """Of every block the sign of its assembly in closed form at a position; 0 of one without unknowns."""
@@ -215,9 +215,9 @@ class AcceptanceFunctions:
             for block, placed, of_type in self._blocks
         ]
 
-    def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
+    def _judge_by_one_formula(self, z: Array, inputs: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns) by the formula of all blocks and pairs."""
-        values = self._fused_position.evaluate_entries(len(z), z.T, *(rates.T for rates in given), *scales)
+        values = self._fused_position.evaluate_entries(len(z), z.T, *(rates.T for rates in inputs), *scales)
         split = ORDERS * len(self.equations.coordinates)
         rates = values[:split].reshape(ORDERS, -1, len(z)).transpose(2, 0, 1)
         result = AcceptanceResult(*values[split : split + RESULT_COUNT])
@@ -237,8 +237,8 @@ class AcceptanceFunctions:
         for block, placed, of_type in self._blocks:
             known, numbers = entries[:, placed.known], scales.p[placed.numbers]
             if start is not None and slice_length(block.unknowns):
-                near, at = start
-                z[block.unknowns] = of_type.run(near[block.unknowns], known[0].T, numbers, at).T
+                near, index = start
+                z[block.unknowns] = of_type.run(near[block.unknowns], known[0].T, numbers, index).T
             sizes = scales.row_scale[block.rows], scales.column_floor[block.unknowns]
             results = of_type.motion.evaluate_entries(samples, z[block.unknowns], *known, numbers, *sizes)
             split = ORDERS * len(placed.coordinates)

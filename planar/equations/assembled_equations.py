@@ -352,17 +352,17 @@ class AssembledEquations:
         from scipy.sparse.linalg import splu
 
         solved = [column for column, _ in self._elimination.solved]
-        left: list[tuple[int, int, float]] = []
-        right: list[tuple[int, int, float]] = []
+        solved_terms: list[tuple[int, int, float]] = []
+        known_terms: list[tuple[int, int, float]] = []
         for place, (_, line) in enumerate(self._elimination.solved):
             for column, factor in line.factors.items():
                 if column in self._place_of:
-                    left.append((place, self._place_of[column], factor))
+                    solved_terms.append((place, self._place_of[column], factor))
                 else:
-                    right.append((place, self._y_place_of[column], -factor))
-            right += [(place, self._y_count + row, -multiplier) for row, multiplier in line.multipliers.items()]
+                    known_terms.append((place, self._y_place_of[column], -factor))
+            known_terms += [(place, self._y_count + row, -multiplier) for row, multiplier in line.multipliers.items()]
         matrices = []
-        for terms, width in ((left, len(solved)), (right, self._y_count + self._rest_count)):
+        for terms, width in ((solved_terms, len(solved)), (known_terms, self._y_count + self._rest_count)):
             rows, columns, values = (np.array(part) for part in zip(*terms, strict=True))
             matrices.append(csr_matrix((values, (rows, columns)), shape=(len(solved), width)))
         factored = splu(matrices[0].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0)  # it is triangular

@@ -49,8 +49,8 @@ def derive_block_motion(e: ConstraintEquations) -> RecordedFormula:
         for k in range(jacobian.size2()):
             loss = ca.fmax(loss, 1.0 / (ca.norm_2(jacobian[:, k]) * regularity * regularity))
         least, distance = regular_distance(jacobian, rates.y, ca.vertcat(z1, u1))
-    wanted = stack_expressions([e.w, w1, w2, e.F, regularity, ca.fmin(least, 1.0), loss, distance])
-    results = [ca.densify(wanted)]
+    motion = stack_expressions([e.w, w1, w2, e.F, regularity, ca.fmin(least, 1.0), loss, distance])
+    results = [ca.densify(motion)]
     if ca.n_nodes(results[0]) <= MAX_CSE_NODES:
         results = ca.cse(results)
     arguments = [e.z, e.u, u1, u2, e.p, row_scale, column_floor]
@@ -134,9 +134,9 @@ def regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, c
     """
     change = ca.reshape(ca.jtimes(ca.vec(block), y, direction), block.shape)
     sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))
-    whole = ca.repmat(sizes, block.size1(), 1)
-    value, _, sign = _singular_value_bounds(block / whole)
-    return value, sign * value / ca.fmax(ca.norm_fro(change / whole), 1e-300)
+    lengths = ca.repmat(sizes, block.size1(), 1)
+    value, _, sign = _singular_value_bounds(block / lengths)
+    return value, sign * value / ca.fmax(ca.norm_fro(change / lengths), 1e-300)
 
 
 class LargeBlockMotion:
@@ -162,8 +162,8 @@ class LargeBlockMotion:
         return np.vstack([coordinates.reshape(count, -1).T, residuals[:, 0].T, bounds])
 
     def _jacobians(self, entries: Array, unknown_count: int) -> Array:
-        whole: Array = np.asarray(SparseMatrices(self._assembled.pattern, entries))
-        return whole[..., :unknown_count]
+        both: Array = np.asarray(SparseMatrices(self._assembled.pattern, entries))
+        return both[..., :unknown_count]
 
     def _bounds(
         self, y: Array, y1: Array, numbers: Array, jacobians: Array, row_scale: Array, column_floor: Array

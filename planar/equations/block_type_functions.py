@@ -130,23 +130,23 @@ class BlockTypeFunctions:
         form = FormulaFunction(formula, (*self._counts, 1), ((1, count), (1, 1)))
         return ClosedFormAssemblies(slice(0, count), form, self.closing, self._formulas.has_changing_arm)
 
-    def run(self, z: Array, known: Array, numbers: Array, at: int = 0) -> Array:
+    def run(self, z: Array, known: Array, numbers: Array, index: int = 0) -> Array:
         """The unknowns (samples, unknowns) where known coordinates are `known` (samples, known); z is next to those of
         the sample `at`."""
         run = self._run_newton if self.assemblies is None else self._run_form
-        return run(z, known, numbers, at)
+        return run(z, known, numbers, index)
 
-    def _run_form(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
+    def _run_form(self, z: Array, known: Array, numbers: Array, index: int) -> Array:
         """The assembly in closed form that is the nearer to z at that sample."""
         assert self.assemblies is not None
         is_angle = self.is_angle
-        sign = np.array([self.nearest_sign(z, known[at], numbers)])
+        sign = np.array([self.nearest_sign(z, known[index], numbers)])
         starts = np.repeat(z[None], len(known), axis=0)
         assemblies, steps = self.polished_form.evaluate_batch(len(known), starts, known, numbers, sign)
         samples: Array = assemblies[:, 0]
         angles = samples[:, is_angle]
         turned = np.cumsum(wrap_angle(np.diff(angles, axis=0, prepend=angles[:1])), axis=0)
-        samples[:, is_angle] = z[is_angle] + wrap_angle(angles[at] - z[is_angle]) + (turned - turned[at])
+        samples[:, is_angle] = z[is_angle] + wrap_angle(angles[index] - z[is_angle]) + (turned - turned[index])
         if (np.abs(steps) > SETTLED_STEP).any():
             polish(self.closing, samples, known, numbers)
         return samples
@@ -156,9 +156,8 @@ class BlockTypeFunctions:
         place = z.tolist(), known.tolist(), numbers.tolist()
 
         def distance(sign: float) -> float:
-            moves = [
-                there - here for there, here in zip(self.polished_form.values(*place, [sign]), place[0], strict=False)
-            ]
+            values = self.polished_form.values(*place, [sign])
+            moves = [value - unknown for value, unknown in zip(values, place[0], strict=False)]
             if not all(map(isfinite, moves)):
                 return inf
             sizes = (remainder(move, TURN) if turns else move for move, turns in zip(moves, self.is_angle, strict=True))
@@ -182,14 +181,14 @@ class BlockTypeFunctions:
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
         return FormulaFunction(formula, counts, ((1, len(z)), (1, len(z))))
 
-    def _run_newton(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
+    def _run_newton(self, z: Array, known: Array, numbers: Array, index: int) -> Array:
         """By Newton's method from where the samples before lead."""
         samples: Array = np.empty((len(known), len(z)))
 
-        samples[at] = z
-        polish(self.closing, samples[at : at + 1], known[at], numbers, steps=MAX_RUN_STEPS)
-        for rows in (range(at + 1, len(known)), range(at - 1, -1, -1)):
-            previous, step = samples[at], np.zeros(len(z))
+        samples[index] = z
+        polish(self.closing, samples[index : index + 1], known[index], numbers, steps=MAX_RUN_STEPS)
+        for rows in (range(index + 1, len(known)), range(index - 1, -1, -1)):
+            previous, step = samples[index], np.zeros(len(z))
             for k in rows:
                 samples[k] = previous + step
                 polish(self.closing, samples[k : k + 1], known[k], numbers, steps=MAX_RUN_STEPS)

@@ -104,12 +104,12 @@ class _BlockPlacer:
         e, elimination = self._equations, self._elimination
         unknowns = list(e.unknowns[block.unknowns])
         solved = sorted((column for column in columns if column in self._order), key=self._order.__getitem__)
-        own = [*unknowns, *solved]
-        if set(own) != set(columns) or block.is_free:
+        columns_inside = [*unknowns, *solved]
+        if set(columns_inside) != set(columns) or block.is_free:
             return None
         residual_lines = [elimination.lines[row] for row in e.row_indices[block.rows]]
         solved_lines = [self._line_of[column] for column in solved]
-        local = _LocalIndices(own)
+        local = _LocalIndices(columns_inside)
         elements = self._place_elements((*solved_lines, *residual_lines), local, block.block_index)
         if elements is None:
             return None
@@ -131,12 +131,13 @@ class _BlockPlacer:
             solved_terms,
             residual_terms,
             tuple(row.kind for row in e.rows[block.rows]),
-            tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in own),
+            tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in columns_inside),
             len(unknowns),
             tuple(kinds[column] for column in local.known),
             len(local.numbers),
         )
-        return PlacedBlock(key, *(np.array(indices, dtype=int) for indices in (local.known, local.numbers, own)))
+        indices = local.known, local.numbers, columns_inside
+        return PlacedBlock(key, *(np.array(part, dtype=int) for part in indices))
 
     def _place_elements(
         self, lines: Sequence[EliminationRow], local: _LocalIndices, level: int
@@ -180,8 +181,8 @@ class _BlockPlacer:
 class _LocalIndices:
     """Indices of a block's own: coordinates, its own ones first, then those that it takes as known; rows, numbers."""
 
-    def __init__(self, own: Sequence[int]):
-        self.places = {column: k for k, column in enumerate(own)}
+    def __init__(self, columns_inside: Sequence[int]):
+        self.places = {column: k for k, column in enumerate(columns_inside)}
         self.known: list[int] = []
         self.rows: dict[int, int] = {}
         self.numbers: list[int] = []

@@ -20,7 +20,7 @@ many positions takes long, and room."""
 
 def formula_text(rows: ca.SX, *symbols: ca.SX) -> str:
     """Rows in columns of symbols, as casadi writes a function: the same text whatever the symbols are called."""
-    renamed = [ca.SX.sym(f"q{k}", each.numel()) for k, each in enumerate(symbols)]
+    renamed = [ca.SX.sym(f"q{k}", symbol.numel()) for k, symbol in enumerate(symbols)]
     function = ca.Function("rows", list(symbols), [ca.densify(rows)])
     text: str = ca.Function("rows", renamed, [function(*renamed)]).serialize()
     return text

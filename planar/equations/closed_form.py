@@ -104,7 +104,7 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     if not any(angles) or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None
     rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
-    others = ca.vertcat(ca.SX(0, 1), *(each for each in ca.symvar(rows) if not ca.depends_on(unknowns, each)))
+    others = ca.vertcat(ca.SX(0, 1), *(symbol for symbol in ca.symvar(rows) if not ca.depends_on(unknowns, symbol)))
     derived = _derive_form(formula_text(rows, unknowns, others), angles)
     if derived is None:
         return None
@@ -142,11 +142,11 @@ def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
         return None
     values = form.values[::-1] if first else form.values
     arm = ca.SX(0.0) if form.squared_arm is None else form.squared_arm
-    found = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
-    wanted = [ca.densify(each) for each in (*found, form.squared_lengths, arm)]
+    results = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
+    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm)]
     part_counts = tuple(len(value) for value in values)
     return _DerivedForm(
-        ca.Function("form", [both, others, form.sign], wanted), part_counts, form.squared_arm is not None
+        ca.Function("form", [both, others, form.sign], outputs), part_counts, form.squared_arm is not None
     )
 
 
@@ -197,20 +197,20 @@ def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | 
     sign = ca.SX.sym("sign")
     if rest[1] and not rest[0] and not rest[2]:
         # the length goes along a direction that is known
-        way, base, reach = fixed, g, a
+        direction, base, reach = fixed, g, a
     elif rest[0] and not rest[1]:
-        way, base, reach = d, a, g
+        direction, base, reach = d, a, g
     else:
         return None
-    gap, spanned = base.cross(way), reach.squared_length * way.squared_length
-    length = (sign * ca.sqrt(spanned - gap * gap) - base.dot(way)) / way.squared_length
-    side = way.squared_length * slide + base.dot(way)
-    if way is fixed:
-        unit = (-(g + way.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
+    gap, spanned = base.cross(direction), reach.squared_length * direction.squared_length
+    length = (sign * ca.sqrt(spanned - gap * gap) - base.dot(direction)) / direction.squared_length
+    side = direction.squared_length * slide + base.dot(direction)
+    if direction is fixed:
+        unit = (-(g + direction.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
-    squared_arm = None if way is fixed else g.squared_length
-    lengths = ca.vertcat(reach.squared_length, way.squared_length)
+    squared_arm = None if direction is fixed else g.squared_length
+    lengths = ca.vertcat(reach.squared_length, direction.squared_length)
     return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, squared_arm)
 
 
@@ -240,26 +240,25 @@ def _rotation_senses(gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int]
     Left: the factors of the sine are those of the cosine, turned to the left by a right angle. All have to turn alike,
     and the form has to agree with the equations.
     """
-    found, values = [], [_evaluate_at_random([gap, *each]) for each in turned]
-    for left, cosine, sine in values:
-        if not np.all(np.abs(left) < ZERO_TOLERANCE):
+    signs, values = [], [_evaluate_at_random([gap, *factors]) for factors in turned]
+    for difference, cosine, sine in values:
+        if not np.all(np.abs(difference) < ZERO_TOLERANCE):
             return None
-        ways = [
-            way for way in (1, -1) if np.all(np.abs(sine - way * np.stack([-cosine[1], cosine[0]])) < ZERO_TOLERANCE)
-        ]
-        if not ways:
+        rotated = np.stack([-cosine[1], cosine[0]])
+        senses = [sense for sense in (1, -1) if np.all(np.abs(sine - sense * rotated) < ZERO_TOLERANCE)]
+        if not senses:
             return None
-        found.append(0 if len(ways) == 2 else ways[0])
-    return found if len(set(found) - {0}) == 1 else None
+        signs.append(0 if len(senses) == 2 else senses[0])
+    return signs if len(set(signs) - {0}) == 1 else None
 
 
 def _which_vanish(parts: list[ca.SX]) -> list[bool]:
-    return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(parts)]
+    return [bool(np.all(np.abs(values) < ZERO_TOLERANCE)) for values in _evaluate_at_random(parts)]
 
 
 def _evaluate_at_random(parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(ca.vertcat(*parts)))
     function = ca.Function("parts", [symbols], [ca.densify(part) for part in parts])
-    found = function(generic_numbers(symbols.numel(), SAMPLE_POINTS))
-    return [each.full() for each in (found if isinstance(found, tuple) else (found,))]
+    values = function(generic_numbers(symbols.numel(), SAMPLE_POINTS))
+    return [value.full() for value in (values if isinstance(values, tuple) else (values,))]

@@ -79,7 +79,7 @@ class _PairGroup:
     names: tuple[str, ...]
     bodies: IntArray
     rows: IntArray
-    own: IntArray
+    own_columns: IntArray
     inputs: IntArray
     numbers: IntArray
 
@@ -119,7 +119,7 @@ class _PairGroup:
             return values.reshape(-1, positions)
 
         arguments = [entries(frames[:, :, body[part]]) for body in self.bodies]
-        arguments += [entries(motion[:, self.own[:, part]]), entries(motion[:, self.inputs[part]])]
+        arguments += [entries(motion[:, self.own_columns[:, part]]), entries(motion[:, self.inputs[part]])]
         numbers = p[self.numbers[:, part]]
         arguments.append(entries(numbers if p.ndim > 1 else np.repeat(numbers[..., None], samples, axis=-1)))
         check = self.value_check if orders == 1 else self.check
@@ -148,7 +148,7 @@ class ConstraintCheck:
 
     def _make_groups(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str]) -> list[_PairGroup]:
         links = {link: k for k, link in enumerate(moving)}
-        own = consecutive_ranges({pair.name: len(pair.coordinate_kinds) for pair in pairs}, 3 * len(moving))
+        own_columns = consecutive_ranges({pair.name: len(pair.coordinate_kinds) for pair in pairs}, 3 * len(moving))
         numbers = consecutive_ranges({pair.name: len(pair.number_kinds) for pair in pairs})
         members: dict[_GroupKey, list[tuple[Pair, range, int]]] = {}
         row = 0
@@ -157,7 +157,7 @@ class ConstraintCheck:
             rows = range(row, row + (1 if is_input else len(pair.residual_kinds)))
             row = rows.stop
             is_moving = tuple(link in links for link in pair.bodies)
-            counts = len(own.get(pair.name, ())), len(pair.number_kinds)
+            counts = len(own_columns.get(pair.name, ())), len(pair.number_kinds)
             key = _GroupKey(recorded_pair_formula(pair, is_input, is_moving, *counts), is_input, is_moving, counts)
             members.setdefault(key, []).append((pair, rows, self._coordinate_count + k - len(pairs)))
         groups = []
@@ -170,7 +170,7 @@ class ConstraintCheck:
                     tuple(member.name for member, *_ in group),
                     _index_columns([[links[link] for link in member.bodies if link in links] for member, *_ in group]),
                     _index_columns([rows for _, rows, _ in group]),
-                    _index_columns([own.get(member.name, ()) for member, *_ in group]),
+                    _index_columns([own_columns.get(member.name, ()) for member, *_ in group]),
                     np.array([column for *_, column in group if key.is_input], dtype=int),
                     # the relative motion of an input that no pair stands for has no numbers, nor does it need any
                     _index_columns([numbers.get(member.name, [0] * len(pair.number_kinds)) for member, *_ in group]),
@@ -241,7 +241,7 @@ class ConstraintCheck:
 def constraint_check(mechanism: Mechanism) -> ConstraintCheck:
     """The constraints of a mechanism; mechanisms of equal pairs share them."""
     motions = relative_motions(mechanism)
-    inputs = tuple(motions[given.pair] for given in mechanism.inputs)
+    inputs = tuple(motions[driven.pair] for driven in mechanism.inputs)
     moving = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
     pairs = tuple(mechanism.pairs)
     try:
@@ -261,7 +261,7 @@ def _index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
 
 def _nonzero(scale: Array) -> Array:
     """What is divided by; one where nothing moves."""
-    return elementwise(lambda each: each + 1.0 * (each <= 0.0), scale)
+    return elementwise(lambda size: size + 1.0 * (size <= 0.0), scale)
 
 
 def _at_least_one(values: Array) -> Array:
@@ -289,8 +289,8 @@ def _frames(coordinates: Array) -> Array:
 def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
     pair, is_input, has_rates = group.pair, group.key.is_input, orders == ORDERS
     counts = [orders * PARTS_OF_FRAME] * len(group.bodies)
-    counts += [orders * len(group.own), orders * is_input, len(pair.number_kinds)]
-    ends = np.cumsum(counts)
+    counts += [orders * len(group.own_columns), orders * is_input, len(pair.number_kinds)]
+    stops = np.cumsum(counts)
 
     def jets(entries: Sequence[RecordedNumber], sizes: bool) -> list[Scalar]:
         if not has_rates:
@@ -299,7 +299,7 @@ def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
         return [term_sizes(value) for value in values] if sizes else values
 
     def formula(arguments: Sequence[RecordedNumber]) -> list[Scalar]:
-        parts = [arguments[end - count : end] for count, end in zip(counts, ends, strict=True)]
+        parts = [arguments[end - count : end] for count, end in zip(counts, stops, strict=True)]
         numbers = parts[-1]
 
         def values(sizes: bool) -> tuple[list[Scalar], list[Scalar]]:
@@ -312,21 +312,21 @@ def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
                 frames.append(
                     frame_term_sizes(x, y, angle) if is_sized else Frame(x, y, cosine, sine, angle, not moves)
                 )
-            own = jets(parts[-3], sizes)
-            residuals = pair_formula(pair, is_input)(frames, numbers, own)
+            own_coordinates = jets(parts[-3], sizes)
+            residuals = pair_formula(pair, is_input)(frames, numbers, own_coordinates)
             positions = jets(parts[-2], sizes) if is_input else [0.0] * len(residuals)
-            return [value - position for value, position in zip(residuals, positions, strict=True)], own
+            return [value - position for value, position in zip(residuals, positions, strict=True)], own_coordinates
 
-        residuals, own = values(False)
+        residuals, own_coordinates = values(False)
         if not has_rates:
             return residuals
         terms, _ = values(True)
         rows = [[*value_and_rates(value)] for value in residuals]
         sizes = [value.parts[1:] if isinstance(value, TermSizes) else (0.0, 0.0) for value in terms]
-        gap = pair.contact_gap(numbers, own) if not is_input else 0.0
+        gap = pair.contact_gap(numbers, own_coordinates) if not is_input else 0.0
         results = [[*row, *size] for row, size in zip(rows, sizes, strict=True)]
         by_result = [row[k] for k in range(RESULTS_OF_ROW) for row in results]
         return [*by_result, *(gap.parts if isinstance(gap, Jet) else ())]
 
-    recorded = record_formula(formula, int(ends[-1]))
+    recorded = record_formula(formula, int(stops[-1]))
     return FormulaFunction(recorded, counts, ((1, len(recorded.results)),))

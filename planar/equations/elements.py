@@ -229,11 +229,11 @@ class ElementPlacement:
 
     def _place(self, pair: Pair, is_input: bool, rows: range) -> PlacedElement:
         is_moving = tuple(link in self._frame_columns for link in pair.bodies)
-        own, numbers = self._own_columns.get(pair.name, ()), self._number_columns.get(pair.name, ())
-        formula = recorded_pair_formula(pair, is_input, is_moving, len(own), len(numbers))
-        key = ElementKey(formula, sum(is_moving), len(own), len(numbers))
+        own_columns, numbers = self._own_columns.get(pair.name, ()), self._number_columns.get(pair.name, ())
+        formula = recorded_pair_formula(pair, is_input, is_moving, len(own_columns), len(numbers))
+        key = ElementKey(formula, sum(is_moving), len(own_columns), len(numbers))
         columns = [column for link in pair.bodies for column in self._frame_columns.get(link, ())]
-        return PlacedElement(element_of_key(key), (*columns, *own), tuple(numbers), rows)
+        return PlacedElement(element_of_key(key), (*columns, *own_columns), tuple(numbers), rows)
 
 
 class ElementGroup(NamedTuple):
@@ -302,9 +302,9 @@ def pattern_of_groups(
     entries, indices = np.unique(np.concatenate([np.zeros(0, dtype=int), *places]), return_inverse=True)
     columns, rows = np.divmod(entries, max(shape[0], 1))
     first = np.searchsorted(columns, np.arange(shape[1] + 1))
-    ends = np.cumsum([len(part) for part in places], dtype=int)
+    stops = np.cumsum([len(part) for part in places], dtype=int)
     entries_of_groups: list[IntArray] = [
         indices[end - len(part) : end].reshape(*group.rows.shape, group.coordinates.shape[1])
-        for end, part, group in zip(ends, places, groups, strict=True)
+        for end, part, group in zip(stops, places, groups, strict=True)
     ]
     return SparsePattern(shape, rows, first), entries_of_groups

@@ -147,8 +147,8 @@ class EquationFunctions:
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
-        many = np.atleast_2d(z)
-        w = self._evaluator(len(many)).coordinates(many, np.broadcast_to(u, (len(many), u.shape[-1])), p)
+        samples = np.atleast_2d(z)
+        w = self._evaluator(len(samples)).coordinates(samples, np.broadcast_to(u, (len(samples), u.shape[-1])), p)
         return w[0] if z.ndim == 1 else w
 
     @cached_property
@@ -196,17 +196,17 @@ class EquationFunctions:
         rates = np.concatenate([z1, u1])
         residuals, jacobian = self.residuals_and_jacobian(z, u, p)
         slopes = np.asarray(jacobian)
-        change = self.jacobian_changes(np.concatenate([z, u]), rates[None], p)[0]
-        own = slice(0, self._unknown_count)
-        system = np.block([[slopes[:, own], 0.0 * slopes[:, own]], [change[:, own], slopes[:, own]]])
+        changes = self.jacobian_changes(np.concatenate([z, u]), rates[None], p)[0]
+        by_z, change = slopes[:, : self._unknown_count], changes[:, : self._unknown_count]
+        system = np.block([[by_z, 0.0 * by_z], [change, by_z]])
         return np.concatenate([residuals, slopes @ rates]), system
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
-        many = np.atleast_2d(y)
-        evaluator = self._evaluator(len(many))
-        y1, y2 = np.broadcast_to(y1, many.shape), np.broadcast_to(y2, many.shape)
-        residuals, coordinates, entries = evaluator.kinematics(many, y1, y2, p)
+        samples = np.atleast_2d(y)
+        evaluator = self._evaluator(len(samples))
+        y1, y2 = np.broadcast_to(y1, samples.shape), np.broadcast_to(y2, samples.shape)
+        residuals, coordinates, entries = evaluator.kinematics(samples, y1, y2, p)
         if y.ndim == 1:
             residuals, coordinates, entries = residuals[0], coordinates[0], entries[0]
         orders = (values[..., order, :] for values in (residuals, coordinates) for order in range(3))

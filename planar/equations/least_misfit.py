@@ -31,8 +31,8 @@ def least_misfit_equations(
     the multipliers behind it, p what the squares count.
     """
     z, u, p, w, F = expressions
-    rows, left, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
-    remaining = [misfits[row] for row in left if row in misfits]
+    rows, last_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
+    remaining = [misfits[row] for row in last_rows if row in misfits]
     if remaining:
         F, w = ca.substitute([F, w], [stack_expressions(remaining)], [ca.SX.zeros(len(remaining))])
     loose = {column for group in structure.groups if misfits.keys() & set(group.rows) for column in group.columns}
@@ -40,28 +40,29 @@ def least_misfit_equations(
     untied = [k for k in range(len(unknowns)) if k not in {*tied}]
     touched = expression_unknowns(F, z)
     # a row that must close is held where it rests on unknowns that the misfits move, and on these alone
-    held = [k for k, row in enumerate(left) if row not in misfits and touched[k] and touched[k] <= {*tied}]
-    unrelated = [k for k, row in enumerate(left) if row not in misfits and k not in held]
-    residual_of = {row: F[k] for k, row in enumerate(left)}
+    closing = [k for k, row in enumerate(last_rows) if row not in misfits]
+    closing_rows = [k for k in closing if touched[k] and touched[k] <= {*tied}]
+    unrelated = [k for k in closing if k not in closing_rows]
+    residual_of = {row: F[k] for k, row in enumerate(last_rows)}
     free = [row for row in misfits if row not in residual_of]
-    multipliers = [ca.SX.sym(f"multiplier {k}") for k in held]
+    multipliers = [ca.SX.sym(f"multiplier {k}") for k in closing_rows]
     weights = stack_expressions(ca.SX.sym(f"weight {row}") for row in misfits)
     values = stack_expressions(residual_of.get(row, symbol) for row, symbol in misfits.items())
     moved = stack_expressions([*(z[k] for k in tied), *(misfits[row] for row in free), *multipliers])
     # J^T W r by itself: the derivative of a sum of squares would take the squares first
     slope = ca.jtimes(values, moved, weights * values, True)
-    if held:
-        closing = stack_expressions(F[k] for k in held)
-        slope += ca.jtimes(closing, moved, stack_expressions(multipliers), True)
-        slope = ca.vertcat(slope[: -len(held)], closing)
+    if closing_rows:
+        residuals = stack_expressions(F[k] for k in closing_rows)
+        slope += ca.jtimes(residuals, moved, stack_expressions(multipliers), True)
+        slope = ca.vertcat(slope[: -len(closing_rows)], residuals)
     first = len(structure.coordinates)
     added = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
-    added += [Coordinate(rows[left[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in held]
+    added += [Coordinate(rows[last_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in closing_rows]
     column_of = {row: first + k for k, row in enumerate(misfits)}
-    names = [rows[row].pair for row in left if row in misfits] or [rows[row].pair for row in misfits]
+    names = [rows[row].pair for row in last_rows if row in misfits] or [rows[row].pair for row in misfits]
     labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
     labels += [rows[row] for row in free]
-    labels += [rows[left[k]] for k in (*held, *unrelated)]
+    labels += [rows[last_rows[k]] for k in (*closing_rows, *unrelated)]
     variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in free)]
     multiplier_columns = range(first + len(misfits), first + len(added))
     with_misfits = ConstraintExpressions(
@@ -81,5 +82,5 @@ def least_misfit_equations(
         make_expressions=lambda: with_misfits,
         open_rows=tuple(misfits),
         misfit_columns=tuple(column_of.values()),
-        row_variables=(*variables, *([HELD] * len(held)), *([UNRELATED] * len(unrelated))),
+        row_variables=(*variables, *([HELD] * len(closing_rows)), *([UNRELATED] * len(unrelated))),
     )

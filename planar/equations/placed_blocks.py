@@ -166,11 +166,11 @@ class KnownCoordinates:
             with self._lock:
                 self._update(block.block_index, z, u, p)
                 return z[block.unknowns], self._state[placed.known], numbers
-        own = z[:, block.unknowns]
+        unknowns = z[:, block.unknowns]
         if u.ndim == p.ndim == 1 and bool((z[:, : block.unknowns.start] == z[0, : block.unknowns.start]).all()):
-            return own, self._arguments(block, z[0], u, p)[1], numbers
+            return unknowns, self._arguments(block, z[0], u, p)[1], numbers
         inputs = np.broadcast_to(u, (len(z), u.shape[-1]))
-        return own, np.hstack([self._assembled.coordinates(z, inputs, p), inputs])[:, placed.known], numbers
+        return unknowns, np.hstack([self._assembled.coordinates(z, inputs, p), inputs])[:, placed.known], numbers
 
     def _update(self, block_index: int, z: Array, u: Array, p: Array) -> None:
         """Bring the state to a position, as far as the block."""
@@ -191,8 +191,8 @@ class KnownCoordinates:
                 self._state[:count] = self._assembled.coordinates(z[None], u[None], p)[0]
                 previous[:] = z
                 return
-            own = z[block.unknowns]
-            self._state[placed.coordinates] = call(own, self._state[placed.known], p[placed.numbers])[0][0]
+            unknowns = z[block.unknowns]
+            self._state[placed.coordinates] = call(unknowns, self._state[placed.known], p[placed.numbers])[0][0]
         # blocks behind are computed again when they are asked for
         previous[:start] = z[:start]
         previous[start:] = np.nan

@@ -244,7 +244,7 @@ def _place_elements(
 def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> EliminatedStructure:
     """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
     motions = relative_motions(mechanism)
-    driven = [motions[given.pair] for given in mechanism.inputs]
+    driven = [motions[driven_input.pair] for driven_input in mechanism.inputs]
     input_kinds = (
         *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
         *(motion.input_kind for motion in driven),
@@ -317,8 +317,8 @@ def _assembled_equations_of(structure: EliminatedStructure) -> ConstraintEquatio
     assembled = AssembledEquations(
         elimination, structure.unknowns, structure.remaining_rows, [row.kind is MeasureKind.ANGLE for row in remaining]
     )
-    ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
-    z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
+    stops = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
+    z, u, p = np.split(generic_numbers(2, int(stops[-1])), stops[:2], axis=1)
     with np.errstate(all="ignore"):
         # what grew beyond all numbers, along a long train of wheels, is more than rounding
         _, entries = assembled.residuals_and_jacobians(z, u, p)
@@ -490,8 +490,8 @@ def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
     z, u, p, w, F = expressions
     jacobian = ca.jacobian(ca.vertcat(F, w), z)
     slope = ca.Function("slope", [z, u, p], [jacobian])
-    ends = np.cumsum([symbol.numel() for symbol in (z, u, p)])
-    slopes = [slope(*np.split(numbers, ends[:2])).nonzeros() for numbers in generic_numbers(2, ends[2])]
+    stops = np.cumsum([symbol.numel() for symbol in (z, u, p)])
+    slopes = [slope(*np.split(numbers, stops[:2])).nonzeros() for numbers in generic_numbers(2, stops[2])]
     rows, columns = np.array(jacobian.sparsity().get_triplet(), dtype=int)
     return _moving_columns(jacobian.size1(), rows, columns, np.array(slopes))
 
