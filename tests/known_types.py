@@ -4,8 +4,7 @@ from planar.equations import elements
 from planar.equations.block_motion import derive_block_motion
 from planar.equations.block_type_functions import MAX_FORMULA_UNKNOWNS, derive_block_type, motion_fingerprint
 from planar.equations.block_types import block_equations, place_blocks, place_input_coordinates
-from planar.equations.element_derivation import derive_element
-from planar.equations.elements import KNOWN_TYPES_FILE
+from planar.equations.elements import KNOWN_TYPES_FILE, derive_element
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import build_equations
 from tests.known import MODELS

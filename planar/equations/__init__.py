@@ -29,10 +29,8 @@ mechanism_numbers     structure, size and numbers p of a mechanism
 residuals             the residuals of all pairs and inputs, for every arithmetic
 linear                small linear systems, as expressions and for arrays
 elements              the formulas of pairs: linear part, rest, derivatives; where a mechanism has them, and in groups
-element_derivation    elements derived by casadi
 elimination           coordinates that enter rows with constant factors are solved for
 symbolic_equations    structure, unknowns, rows and blocks; z, u, p, w, F as casadi expressions where they are needed
-least_misfit          equations of pairs that are held more than once and close within a misfit
 assembled_equations   F, w, rates and Jacobians from the elements by index arrays, at any number of samples
 block_types           blocks by their own equations, placed by indices
 block_type_functions  residuals, coordinates, closed form, motion and runs of a block type

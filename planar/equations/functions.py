@@ -61,8 +61,11 @@ class EquationFunctions:
     evaluated several times the formulas of all elements are made one, unless its unknowns are many.
     """
 
-    def __init__(self, equations: ConstraintEquations):
+    def __init__(self, equations: ConstraintEquations, formulas: StructureFormulas | None = None):
+        """`formulas` are those of equations that are not assembled from elements."""
         self.equations = equations
+        if formulas is not None:
+            self.formulas = formulas
         self._unknown_count = len(equations.unknowns)
         is_large = self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
         self.is_sparse = is_large and equations.is_square
@@ -94,7 +97,7 @@ class EquationFunctions:
         if block.block_index not in self._block_calls:
             by_type = self._functions_of_type(block)
             self._block_calls[block.block_index] = (
-                self.formulas.block_function(block)
+                self.formulas.block_call(block)
                 if by_type is None
                 else PlacedBlockCall(by_type.closing, self._known_coordinates.arguments_of(block))
             )

@@ -15,6 +15,7 @@ import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations
+from planar.equations.placed_blocks import BlockCall
 from planar.equations.sparse_matrices import SparsePattern
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
@@ -85,7 +86,13 @@ class StructureFormulas:
         self._rows, self._coordinate_count = len(equations.rows), len(equations.coordinates)
         self._y_count = self.pattern.shape[1]
         self._counts = equations.argument_counts
+        self.unknown_count = self._counts[0]
         self._rate_functions: dict[tuple[str, int], FormulaFunction] = {}
+
+    @property
+    def recorded(self) -> StructureFormulas:
+        """The same as formulas that can be printed."""
+        return self
 
     @cached_property
     def _residuals(self) -> RecordedFormula:
@@ -140,9 +147,11 @@ class StructureFormulas:
         function = self._rate_functions.get((name, order))
         if function is None:
             counts = *([self._y_count] * (order + 1)), self._counts[-1]
-            instructions, (*parts, numbers) = recorded_arguments(counts)
-            jets = formula.evaluate([*map(Jet, *parts), *numbers])
-            results = [number_of(jet.parts[order] if isinstance(jet, Jet) else 0.0, instructions) for jet in jets]
+            instructions, (*rates_of_y, numbers) = recorded_arguments(counts)
+            jets = formula.evaluate([*map(Jet, *rates_of_y), *numbers])
+            constant_part = 0.0 if order else 1.0
+            parts = [jet.parts[order] if isinstance(jet, Jet) else constant_part * jet for jet in jets]
+            results = [number_of(part, instructions) for part in parts]
             function = FormulaFunction(formula_of_results(instructions, results), counts, ((1, len(results)),))
             self._rate_functions[name, order] = function
         return function.evaluate_entries(len(rates[-1]), *(rate.T for rate in rates), p).T
@@ -155,11 +164,16 @@ class StructureFormulas:
         """The same of w (samples, coordinates)."""
         return self._rates("w", self._coordinates, rates, p)
 
-    def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
-        """How dF/dy (rows, y) at y (y,) changes along directions (k, y): (k, rows, y)."""
-        jacobian: Array = np.zeros((len(directions), *self.pattern.shape))
-        jacobian[:, self.pattern.rows, self.pattern.columns] = self._rates("dF/dy", self._entries, (y, directions), p)
+    def jacobian_rate(self, rates: Sequence[Array], p: Array) -> Array:
+        """The time derivative of dF/dy (samples, rows, y) of the order of the last rate, from y and its rates, of
+        (samples, y), or y (y,) for all samples."""
+        jacobian: Array = np.zeros((len(rates[-1]), *self.pattern.shape))
+        jacobian[:, self.pattern.rows, self.pattern.columns] = self._rates("dF/dy", self._entries, rates, p)
         return jacobian
+
+    def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
+        """How dF/dy (rows, y) at y (y,), or places (k, y), changes along directions (k, y): (k, rows, y)."""
+        return self.jacobian_rate((y, directions), p)
 
     def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
         """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""
@@ -189,6 +203,10 @@ class StructureFormulas:
             if isinstance(result, Jet):
                 term_sum[:, row] += np.abs(np.broadcast_to(result.parts[1], (len(y), len(p)))) @ np.abs(p)[:, None]
         return RoundingTerms(value, term_sum[..., 0], *slopes)
+
+    def block_call(self, block: Block) -> BlockCall:
+        """The residuals of a block and the columns of its Jacobian, as `block_function` has them."""
+        return self.block_function(block)
 
     def block_function(self, block: Block) -> FormulaFunction:
         """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its own unknowns (unknowns, rows)."""

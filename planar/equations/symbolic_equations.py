@@ -41,6 +41,8 @@ else:
 
 MIN_MOVING_SLOPE = 1e-12
 """An entry of a Jacobian at random places, unknowns of about one, that is greater than rounding."""
+HELD, UNRELATED = -1, -2
+"""Rows that are no derivatives of the sum of squares of misfits: that have to close beside it, and the rest."""
 
 
 class Block(NamedTuple):
@@ -414,10 +416,8 @@ def _without_idle_unknowns(expressions: ConstraintExpressions, moved: Sequence[s
 
 def _least_misfit_equations_of(structure: EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
     """The equations of the position of least misfit, in which some rows of pairs may stay open."""
-    from planar.equations.least_misfit import least_misfit_equations  # few pairs may stay open
-
     misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
-    equations = least_misfit_equations(structure, _expressions_of(structure, misfits), misfits)
+    equations = _with_least_misfit(structure, _expressions_of(structure, misfits), misfits)
     expressions = equations.expressions
     moved = _moving_unknowns(expressions)
     equations = replace(equations, make_expressions=lambda: _without_idle_unknowns(expressions, moved))
@@ -427,6 +427,86 @@ def _least_misfit_equations_of(structure: EliminatedStructure, open_rows: Sequen
         return tuple(max((level_of[column] for column in unknowns), default=-1) for unknowns in of_coordinates)
 
     return _split_into_blocks(structure, equations, moved, coordinate_levels)
+
+
+def _slope_of_squares(
+    values: ca.SX, weights: ca.SX, unknowns: ca.SX, multipliers: Sequence[ca.SX], closing: Sequence[ca.SX]
+) -> ca.SX:
+    """The derivatives of the weighed sum of squares of misfits by unknowns, of which the last are the multipliers of
+    rows that have to close: by these, the rows.
+
+    The sum is least where all of them vanish (C. F. Gauss, Theoria combinationis 1823); a row that has to close, as an
+    input's, has a multiplier (J.-L. Lagrange). Angles count as arcs at the mechanism's size.
+    """
+    # J^T W r by itself: the derivative of a sum of squares would take the squares first
+    slope = ca.jtimes(values, unknowns, weights * values, True)
+    if not multipliers:
+        return slope
+    residuals = stack_expressions(closing)
+    slope += ca.jtimes(residuals, unknowns, stack_expressions(multipliers), True)
+    return ca.vertcat(slope[: -len(multipliers)], residuals)
+
+
+def _with_least_misfit(
+    structure: EliminatedStructure, expressions: ConstraintExpressions, misfits: Mapping[int, ca.SX]
+) -> ConstraintEquations:
+    """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
+
+    An eliminated row leaves its misfit, which is an unknown; one that remains has for a misfit its residual.
+
+    F first has the derivatives by the unknowns that misfits move, by the misfits of rows that were eliminated, and of
+    multipliers the rows that are held; then the rows that are unrelated to misfits. w has the misfits of all rows and
+    the multipliers behind it, p what the squares count.
+    """
+    z, u, p, w, F = expressions
+    rows, last_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
+    remaining = [misfits[row] for row in last_rows if row in misfits]
+    if remaining:
+        F, w = ca.substitute([F, w], [stack_expressions(remaining)], [ca.SX.zeros(len(remaining))])
+    loose = {column for group in structure.groups if misfits.keys() & set(group.rows) for column in group.columns}
+    tied = [k for k, column in enumerate(unknowns) if column in loose]
+    untied = [k for k in range(len(unknowns)) if k not in {*tied}]
+    touched = expression_unknowns(F, z)
+    # a row that must close is held where it rests on unknowns that the misfits move, and on these alone
+    closing = [k for k, row in enumerate(last_rows) if row not in misfits]
+    closing_rows = [k for k in closing if touched[k] and touched[k] <= {*tied}]
+    unrelated = [k for k in closing if k not in closing_rows]
+    residual_of = {row: F[k] for k, row in enumerate(last_rows)}
+    free = [row for row in misfits if row not in residual_of]
+    multipliers = [ca.SX.sym(f"multiplier {k}") for k in closing_rows]
+    weights = stack_expressions(ca.SX.sym(f"weight {row}") for row in misfits)
+    values = stack_expressions(residual_of.get(row, symbol) for row, symbol in misfits.items())
+    moved = stack_expressions([*(z[k] for k in tied), *(misfits[row] for row in free), *multipliers])
+    slope = _slope_of_squares(values, weights, moved, multipliers, [F[k] for k in closing_rows])
+    first = len(structure.coordinates)
+    added = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
+    added += [Coordinate(rows[last_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in closing_rows]
+    column_of = {row: first + k for k, row in enumerate(misfits)}
+    names = [rows[row].pair for row in last_rows if row in misfits] or [rows[row].pair for row in misfits]
+    labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
+    labels += [rows[row] for row in free]
+    labels += [rows[last_rows[k]] for k in (*closing_rows, *unrelated)]
+    variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in free)]
+    multiplier_columns = range(first + len(misfits), first + len(added))
+    with_misfits = ConstraintExpressions(
+        ca.vertcat(moved, *(z[k] for k in untied)),
+        u,
+        ca.vertcat(p, weights),
+        ca.vertcat(w, values, *multipliers),
+        ca.vertcat(slope, *(F[k] for k in unrelated)),
+    )
+    return ConstraintEquations(
+        coordinates=(*structure.coordinates, *added),
+        unknowns=(*variables, *multiplier_columns, *(unknowns[k] for k in untied)),
+        rows=tuple(labels),
+        blocks=(),
+        known_after_block=(),
+        input_kinds=structure.input_kinds,
+        make_expressions=lambda: with_misfits,
+        open_rows=tuple(misfits),
+        misfit_columns=tuple(column_of.values()),
+        row_variables=(*variables, *([HELD] * len(closing_rows)), *([UNRELATED] * len(unrelated))),
+    )
 
 
 def _split_into_blocks(

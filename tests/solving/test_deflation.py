@@ -1,6 +1,7 @@
 """Bodies that parallel slots hold to second order only: to first order they could turn, in every position."""
 
-from math import cos, pi, sin, sqrt
+from itertools import permutations
+from math import cos, factorial, pi, prod, sin, sqrt
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import planar
 from planar.analysis.identity.mobility import mobility
 from planar.analysis.worked.solution import worked_solution
-from planar.equations.rank_conditions import constraint_dependencies, symbolic_determinant
+from planar.equations.rank_conditions import constraint_dependencies, determinant_rates, symbolic_determinant
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.position import solved_mechanism
@@ -276,6 +277,32 @@ def test_determinants_without_division_are_those_of_numpy(size):
     singular = matrices[0]
     singular[-1] = singular[: size - 1].sum(axis=0)
     assert float(determinant(singular)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rates_of_determinants_are_those_of_their_polynomials():
+    rng, time = np.random.default_rng(0), np.polynomial.Polynomial([0.0, 1.0])
+    for size in (1, 2, 4, 6):
+        matrices = rng.normal(size=(4, 3, size, size)) * np.array([1.0, 5.0, 0.2, 30.0])[:, None, None, None]
+        rates = determinant_rates(matrices)
+        for sample in range(3):
+            polynomials = [
+                [
+                    sum(part[i, j] * time**k / factorial(k) for k, part in enumerate(matrices[:, sample]))
+                    for j in range(size)
+                ]
+                for i in range(size)
+            ]
+            total = sum(
+                np.linalg.det(np.eye(size)[list(order)])
+                * prod(row[j] for row, j in zip(polynomials, order, strict=True))
+                for order in permutations(range(size))
+            )
+            expected = [total.deriv(k)(0.0) if k else total(0.0) for k in range(4)]
+            for k in range(4):
+                sizes = np.abs(expected).max()
+                assert rates[k, sample] == pytest.approx(expected[k], rel=1e-9, abs=1e-11 * sizes)
+        for orders in (1, 2, 3):
+            np.testing.assert_allclose(determinant_rates(matrices[:orders]), rates[:orders], rtol=1e-9, atol=1e-10)
 
 
 def test_on_what_constraints_depend_is_worked_out_once_for_a_structure():

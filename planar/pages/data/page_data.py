@@ -167,7 +167,7 @@ def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dic
     stop_if_over("before the forces of the page were set up")
     acting = force_data(numbers, mechanism, state, solver.unit)
     data["forces"] = acting and acting[0]
-    formulas = program.formulas
+    formulas = program.formulas.recorded
     functions = [
         numbers.to_javascript(),
         drawing.to_javascript(),
