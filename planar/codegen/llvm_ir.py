@@ -9,7 +9,7 @@ from math import factorial, pi
 from planar.foundation.instruction_list import Instructions, UnsupportedOperation
 
 LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}
+LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor", "minnum": "minnum", "maxnum": "maxnum"}
 LLVM_COMPARISONS = {"less": "olt", "most": "ole"}
 """What gives 1 where it is true, else 0."""
 LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "tan": 1, "atan": 1, "atan2": 2, "pow": 2}
@@ -270,8 +270,6 @@ class IRWriter:
                 names[number] = self.add_instruction(f"fneg {self.vector} {of[0]}")
             elif value.operation in LLVM_OPERATIONS:
                 names[number] = self.binary(value.operation, *of)
-            elif value.operation in ("minnum", "maxnum"):
-                names[number] = self.call_intrinsic(value.operation, *of)
             elif value.operation in LIBRARY_ARGUMENT_COUNTS:
                 names[number] = self.call_per_lane(value.operation, *of)
             elif value.operation in LLVM_COMPARISONS:

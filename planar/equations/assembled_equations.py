@@ -174,11 +174,6 @@ class AssembledEquations:
         self._last: _Evaluation | None = None
         self._all_residuals = _sums((row, sums.items()) for row, sums in enumerate(self._residual_sums))
 
-    @property
-    def argument_counts(self) -> tuple[int, int, int]:
-        """How many entries z, u and p have."""
-        return len(self._unknowns), self._elimination.input_count, self._elimination.number_count
-
     # sums over x = (y, rests)
 
     def _state_sums(self, column: int) -> dict[int, float]:

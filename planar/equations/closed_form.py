@@ -86,16 +86,6 @@ class _ComplexNumber(NamedTuple):
         return _ComplexNumber(self.x, -self.y)
 
 
-class _DerivedForm(NamedTuple):
-    """The closed form of a formula of two rows: a function (unknowns, other symbols, sign) -> the parts of the values
-    one after the other, and what else a `ClosedForm` holds; how many parts each value has, and whether there is an arm.
-    """
-
-    function: ca.Function
-    part_counts: tuple[int, ...]
-    has_arm: bool
-
-
 def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     """The closed form of a block; None where it has none of the three forms."""
     if stage.is_free or not slice_length(stage.rows) == slice_length(stage.unknowns) == 2:
@@ -108,12 +98,13 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     derived = _derive_form(formula_text(rows, unknowns, others), angles)
     if derived is None:
         return None
+    function, part_counts, has_arm = derived
     sign = ca.SX.sym("sign")
-    *results, lengths, arm = derived.function(unknowns, others, sign)
+    *results, lengths, arm = function(unknowns, others, sign)
     parts = iter(results)
-    values = tuple(tuple(next(parts) for _ in range(count)) for count in derived.part_counts)
+    values = tuple(tuple(next(parts) for _ in range(count)) for count in part_counts)
     side, coalescence = parts
-    return ClosedForm(values, sign, side, coalescence, lengths, arm if derived.has_arm else None)
+    return ClosedForm(values, sign, side, coalescence, lengths, arm if has_arm else None)
 
 
 def closed_form_formula(e: ConstraintEquations, block: Block) -> tuple[RecordedFormula | None, bool]:
@@ -128,9 +119,13 @@ def closed_form_formula(e: ConstraintEquations, block: Block) -> tuple[RecordedF
 
 
 @lru_cache(maxsize=1024)
-def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
+def _derive_form(formula: str, angles: tuple[bool, ...]) -> tuple[ca.Function, tuple[int, ...], bool] | None:
     """The closed form of rows that are a function, as casadi writes it, of two unknowns, some of them angles, and of
-    other symbols: once for all blocks of that formula."""
+    other symbols: once for all blocks of that formula.
+
+    A function (unknowns, other symbols, sign) -> the parts of the values one after the other, and what else a
+    `ClosedForm` holds; how many parts each value has, and whether there is an arm.
+    """
     function = ca.Function.deserialize(formula)
     both, others = (ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(("unknowns", "others")))
     rows = function(both, others)
@@ -145,9 +140,8 @@ def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
     results = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
     outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm)]
     part_counts = tuple(len(value) for value in values)
-    return _DerivedForm(
-        ca.Function("form", [both, others, form.sign], outputs), part_counts, form.squared_arm is not None
-    )
+    derived = ca.Function("form", [both, others, form.sign], outputs)
+    return derived, part_counts, form.squared_arm is not None
 
 
 def _solve_two_angles(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
@@ -192,13 +186,13 @@ def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | 
     if signs is None:
         return None
     parts = fixed_slide, turned_slide[0], turned[0]
-    rest = _which_vanish(list(parts))
+    is_zero = [bool(np.all(np.abs(values) < ZERO_TOLERANCE)) for values in _evaluate_at_random(list(parts))]
     fixed, d, a, g = (_rows_as_complex(part, signs) for part in (*parts, fixed_rows))
     sign = ca.SX.sym("sign")
-    if rest[1] and not rest[0] and not rest[2]:
+    if is_zero[1] and not is_zero[0] and not is_zero[2]:
         # the length goes along a direction that is known
         direction, base, reach = fixed, g, a
-    elif rest[0] and not rest[1]:
+    elif is_zero[0] and not is_zero[1]:
         direction, base, reach = d, a, g
     else:
         return None
@@ -250,10 +244,6 @@ def _rotation_senses(gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int]
             return None
         signs.append(0 if len(senses) == 2 else senses[0])
     return signs if len(set(signs) - {0}) == 1 else None
-
-
-def _which_vanish(parts: list[ca.SX]) -> list[bool]:
-    return [bool(np.all(np.abs(values) < ZERO_TOLERANCE)) for values in _evaluate_at_random(parts)]
 
 
 def _evaluate_at_random(parts: list[ca.SX]) -> list[Array]:

@@ -216,7 +216,8 @@ class ConstraintCheck:
         counted = np.concatenate(
             [np.abs(evaluated.frames[0, 4]), np.abs(motion[0, 3 * self._link_count : self._coordinate_count])]
         )
-        return np.abs(evaluated.rows[0]) / _at_least_one(greatest_entries(counted) / (2.0 * pi))
+        turns = greatest_entries(counted) / (2.0 * pi)
+        return np.abs(evaluated.rows[0]) / greatest_entries(np.stack([turns, 0.0 * turns + 1.0]))
 
     def rate_errors(self, evaluated: ConstraintRows) -> tuple[Array, Array]:
         """How far first and second rates break constraints, as parts of their terms (constraints, samples)."""
@@ -262,10 +263,6 @@ def _index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
 def _nonzero(scale: Array) -> Array:
     """What is divided by; one where nothing moves."""
     return elementwise(lambda size: size + 1.0 * (size <= 0.0), scale)
-
-
-def _at_least_one(values: Array) -> Array:
-    return greatest_entries(np.stack([values, 0.0 * values + 1.0]))
 
 
 def _frames(coordinates: Array) -> Array:

@@ -44,8 +44,6 @@ BINARY_OPERATIONS = {
     ca.OP_LT: "less",
     ca.OP_LE: "most",
 }
-
-
 FORMULA_OPERATIONS = {
     ca.OP_POW: "pow",
     ca.OP_CONSTPOW: "pow",
@@ -56,18 +54,16 @@ FORMULA_OPERATIONS = {
 """What formulas of pairs may have beside what machine code knows."""
 
 
-def apply_operation(code: int, operands: Sequence[Any]) -> Any:
-    """What an operation of casadi makes of numbers of any kind. Raises KeyError for one that is not of `OPERATIONS`."""
-    return OPERATIONS[code](*operands)
-
-
 def evaluate_function(
     function: ca.Function,
     inputs: Sequence[Sequence[Any]],
     convert: Callable[[float], Any],
-    apply: Callable[[int, list[Any]], Any] = apply_operation,
+    apply: Callable[[int, list[Any]], Any] = lambda code, operands: OPERATIONS[code](*operands),
 ) -> list[list[Any]]:
-    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation."""
+    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation.
+
+    By default those of `OPERATIONS`; raises KeyError for another.
+    """
     work: dict[int, Any] = {}
     results: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
     places = [function.sparsity_out(k).find() for k in range(function.n_out())]

@@ -29,9 +29,9 @@ from planar.foundation.recorded_formula import (
 )
 
 
-def _record_elements(assembled: AssembledEquations) -> tuple[RecordedFormula, RecordedFormula]:
+def _record_elements(assembled: AssembledEquations, counts: Sequence[int]) -> tuple[RecordedFormula, RecordedFormula]:
     """The formulas (z, u, p) -> F (rows,), then the entries of dF/dy, and (z, u, p) -> w of elements."""
-    instructions, (z, u, p) = recorded_arguments(assembled.argument_counts)
+    instructions, (z, u, p) = recorded_arguments(counts)
 
     def formula_of(values: Iterable[Scalar]) -> RecordedFormula:
         return formula_of_results(instructions, [number_of(value, instructions) for value in values])
@@ -74,10 +74,10 @@ class StructureFormulas:
     """The equations of one structure as formulas; evaluated as by `AssembledEquations`."""
 
     def __init__(self, equations: ConstraintEquations):
-        assembled = equations.assembled
+        assembled, self._counts = equations.assembled, equations.argument_counts
         if assembled is not None:
             self.pattern = assembled.pattern
-            self._closing, self._coordinates = _record_elements(assembled)
+            self._closing, self._coordinates = _record_elements(assembled, self._counts)
         else:
             sparsity = equations.jacobian.sparsity()
             rows, first = np.array(sparsity.row(), dtype=int), np.array(sparsity.colind())
@@ -85,7 +85,6 @@ class StructureFormulas:
             self._closing, self._coordinates = _record_expressions(equations)
         self._rows, self._coordinate_count = len(equations.rows), len(equations.coordinates)
         self._y_count = self.pattern.shape[1]
-        self._counts = equations.argument_counts
         self.unknown_count = self._counts[0]
         self._rate_functions: dict[tuple[str, int], FormulaFunction] = {}
 
