@@ -111,7 +111,7 @@ class AcceptanceFunctions:
         self.is_available = functions.is_square and e.elimination is not None and len(self._placed) == len(blocks)
         self.unknown_columns = np.array(e.unknowns, dtype=int)
         "the coordinates that are the unknowns"
-        self.check = constraint_check(structure)
+        self.check = constraint_check(structure, len(e.coordinates))
         self.block_starts = np.array([block.unknowns.start for block in e.blocks], dtype=int)
         self._call_count = 0
 

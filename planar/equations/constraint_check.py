@@ -135,15 +135,17 @@ _RECORDED_CHECKS: dict[Hashable, FormulaFunction] = {}
 class ConstraintCheck:
     """The constraints of pairs, then of inputs, between these moving links, of coordinates w and inputs u with rates.
 
-    In w the parts of all links come first, then the pairs' own coordinates; the inputs stand behind.
+    In w the parts of all links come first, then the pairs' own coordinates; behind all coordinates stand the inputs.
     """
 
-    def __init__(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str]):
+    def __init__(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str], coordinate_count: int):
         kinds = [kind for pair in pairs for kind in pair.residual_kinds] + [pair.input_kind for pair in inputs]
         self._lengths = np.flatnonzero([kind is MeasureKind.LENGTH for kind in kinds])
         self._angles = np.flatnonzero([kind is MeasureKind.ANGLE for kind in kinds])
         self._row_count, self._link_count = len(kinds), len(moving)
-        self._coordinate_count = 3 * len(moving) + sum(len(pair.coordinate_kinds) for pair in pairs)
+        self._coordinate_count = coordinate_count
+        own_count = sum(len(pair.coordinate_kinds) for pair in pairs)
+        self._own = slice(3 * len(moving), 3 * len(moving) + own_count)
         self.groups = self._make_groups(pairs, inputs, moving)
 
     def _make_groups(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str]) -> list[_PairGroup]:
@@ -213,9 +215,7 @@ class ConstraintCheck:
 
         The round-off of an angle, and of where its cos and sin put things, grows with them.
         """
-        counted = np.concatenate(
-            [np.abs(evaluated.frames[0, 4]), np.abs(motion[0, 3 * self._link_count : self._coordinate_count])]
-        )
+        counted = np.concatenate([np.abs(evaluated.frames[0, 4]), np.abs(motion[0, self._own])])
         turns = greatest_entries(counted) / (2.0 * pi)
         return np.abs(evaluated.rows[0]) / greatest_entries(np.stack([turns, 0.0 * turns + 1.0]))
 
@@ -239,16 +239,16 @@ class ConstraintCheck:
         return np.stack([0.0 * greatest + 1.0, _nonzero(greatest), _nonzero(of_arcs)])
 
 
-def constraint_check(mechanism: Mechanism) -> ConstraintCheck:
-    """The constraints of a mechanism; mechanisms of equal pairs share them."""
+def constraint_check(mechanism: Mechanism, coordinate_count: int) -> ConstraintCheck:
+    """The constraints of a mechanism of so many coordinates; mechanisms of equal pairs share them."""
     motions = relative_motions(mechanism)
     inputs = tuple(motions[driven.pair] for driven in mechanism.inputs)
     moving = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
     pairs = tuple(mechanism.pairs)
     try:
-        return _cached_check(pairs, inputs, moving)
+        return _cached_check(pairs, inputs, moving, coordinate_count)
     except TypeError:  # made in Python, of lists
-        return ConstraintCheck(pairs, inputs, moving)
+        return ConstraintCheck(pairs, inputs, moving, coordinate_count)
 
 
 _cached_check = lru_cache(maxsize=MAX_CACHED_CHECKS)(ConstraintCheck)

@@ -87,7 +87,9 @@ class ResidualCheck:
 
     @cached_property
     def _check(self) -> ConstraintCheck:
-        return constraint_check(self.mechanism)
+        own_count = sum(len(pair.coordinate_kinds) for pair in self.mechanism.pairs)
+        moving_count = sum(link.name != self.mechanism.frame for link in self.mechanism.links)
+        return constraint_check(self.mechanism, 3 * moving_count + own_count)
 
     def _motion(self, frames: Frames, own: PairValues, inputs: Sequence[Scalar] | Array, orders: int) -> Array:
         """Links, pairs and inputs, values and rates up to `orders` (orders, entries, samples), lengths in sizes."""
