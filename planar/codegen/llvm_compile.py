@@ -52,20 +52,15 @@ C_TYPES: Mapping[str, type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]] 
 @lru_cache(maxsize=64)
 def compile_function(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
-    engine = _load_or_compile(text)
-    function: Any = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
-    function.engine = engine  # what was compiled lives as long as the function
-    return function
-
-
-def _load_or_compile(text: str) -> Any:
-    """The text's machine code, from the disk or new."""
     key = fingerprint(text)
-    code = MACHINE_CODE.read(key)
+    code = MACHINE_CODE.read(key)  # from the disk, or new
     if code is None:
         code = _compile_object(text)
         MACHINE_CODE.write(key, code)
-    return _load_object(code)
+    engine = _load_object(code)
+    function: Any = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
+    function.engine = engine  # what was compiled lives as long as the function
+    return function
 
 
 def fingerprint(text: str) -> str:

@@ -114,17 +114,15 @@ class IRWriter:
         )
         self.write_line(f"store {both} {pairs}, ptr {pointer}, align 8")
 
-    def store_streaming(self, value: str, pointer: str) -> None:
-        """Store what is not read again soon, past the caches; where whole vectors begin."""
-        self._store_streaming(self.vector, value, pointer)
+    def store_streaming(self, value: str, pointer: str, vector: str | None = None) -> None:
+        """Store what is not read again soon, past the caches; where whole vectors begin. `vector` is its type, by
+        default doubles."""
+        self.write_line(f"store {vector or self.vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
 
     def store_streaming_rounded(self, value: str, pointer: str) -> None:
         """The same, each number rounded once to single precision."""
         single = f"<{self.lanes} x float>"
-        self._store_streaming(single, self.add_instruction(f"fptrunc {self.vector} {value} to {single}"), pointer)
-
-    def _store_streaming(self, vector: str, value: str, pointer: str) -> None:
-        self.write_line(f"store {vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
+        self.store_streaming(self.add_instruction(f"fptrunc {self.vector} {value} to {single}"), pointer, single)
 
     def close_loop(self, counter: str, last: str, again: str, after: str) -> None:
         """Count on, and go round again up to the last."""

@@ -13,7 +13,7 @@ import numpy as np
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import INPUT_BLOCK, PlacedBlock, place_input_coordinates
-from planar.equations.constraint_check import ORDERS, constraint_check
+from planar.equations.constraint_check import ORDERS, ConstraintCheck, constraint_check
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
@@ -111,9 +111,13 @@ class AcceptanceFunctions:
         self.is_available = functions.is_square and e.elimination is not None and len(self._placed) == len(blocks)
         self.unknown_columns = np.array(e.unknowns, dtype=int)
         "the coordinates that are the unknowns"
-        self.check = constraint_check(structure, len(e.coordinates))
         self.block_starts = np.array([block.unknowns.start for block in e.blocks], dtype=int)
         self._call_count = 0
+
+    @cached_property
+    def check(self) -> ConstraintCheck:
+        """The check of all constraints."""
+        return constraint_check(self.structure, len(self.equations.coordinates))
 
     @cached_property
     def _blocks(self) -> list[tuple[Block, PlacedBlock, BlockTypeFunctions]]:

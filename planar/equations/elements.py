@@ -218,11 +218,11 @@ class _ElementDerivation:
         self._cosines = [ca.SX.sym(f"c{body}") for body in range(bodies)]
         self._sines = [ca.SX.sym(f"s{body}") for body in range(bodies)]
         self._numbers = [ca.SX.sym(f"n{k}") for k in range(number_count)]
-        frames = [
-            (*self._coordinates[3 * k : 3 * k + 2], self._cosines[k], self._sines[k], self._coordinates[3 * k + 2])
-            for k in range(bodies)
-        ]
-        arguments = [*(part for frame in frames for part in frame), *self._coordinates[3 * bodies :], *self._numbers]
+        arguments: list[ca.SX] = []
+        for k in range(bodies):
+            x, y, angle = self._coordinates[3 * k : 3 * k + 3]
+            arguments += [x, y, self._cosines[k], self._sines[k], angle]
+        arguments += [*self._coordinates[3 * bodies :], *self._numbers]
         assert len(arguments) == PARTS_OF_FRAME * bodies + own_count + number_count
         self._factors: list[dict[int, float]] = []
         self._nonlinear: list[set[int]] = []
