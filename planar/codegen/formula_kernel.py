@@ -20,67 +20,81 @@ FormulaKernel = Callable[[int, Sequence[Array]], Array]
 def compile_kernel(formula: RecordedFormula, argument_counts: Sequence[int], varies: Sequence[bool]) -> FormulaKernel:
     """The machine code of a formula; which of its arguments vary from position to position. Raises
     UnsupportedOperation."""
-    run = compile_function(_write_ir(formula, argument_counts, varies), "run", "int", "int", *["array"] * 3)
-    varying_count = sum(count for count, is_varying in zip(argument_counts, varies, strict=True) if is_varying)
-    still_count = sum(argument_counts) - varying_count
-    result_count = len(formula.results)
+    writer = IRWriter(LANES, contracts=False)
+    varying: list[tuple[int, ...]] = []
+    still: list[int] = []
+    place = 0
+    for count, is_varying in zip(argument_counts, varies, strict=True):
+        keys = range(place, place + count)
+        place += count
+        if is_varying:
+            varying += zip(keys)
+        else:
+            still += keys
+    write_rows(writer, formula, varying, still, list(zip(formula.results)))
+    run = compile_function(writer.module_text(), "run", "int", "int", *["array"] * 3)
 
     def evaluate(count: int, arguments: Sequence[Array]) -> Array:
         stride = -(-count // LANES) * LANES
-        varying, still = np.empty((varying_count, stride)), np.empty(still_count)
-        row = place = 0
+        rows = np.empty((len(varying), stride))
+        numbers = np.empty(len(still))
+        parts: tuple[list[Array], list[Array]] = [numbers[:0]], [rows[:0, :count]]
         for argument, is_varying in zip(arguments, varies, strict=True):
-            if is_varying:
-                varying[row : row + len(argument), :count] = argument
-                row += len(argument)
-            else:
-                still[place : place + len(argument)] = argument
-                place += len(argument)
-        results: Array = np.empty((result_count, stride))
+            parts[is_varying].append(argument)
+        np.concatenate(parts[0], out=numbers)
+        np.concatenate(parts[1], out=rows[:, :count])
+        results: Array = np.empty((len(formula.results), stride))
         if count:
-            run(stride // LANES, stride, *(array.ctypes.data for array in (varying, still, results)))
+            run(stride // LANES, stride, *(array.ctypes.data for array in (rows, numbers, results)))
         return results[:, :count]
 
     return evaluate
 
 
-def _write_ir(formula: RecordedFormula, argument_counts: Sequence[int], varies: Sequence[bool]) -> str:
-    """run(vectors, stride, varying, still, results): entries that vary and results in rows `stride` apart."""
-    writer = IRWriter(LANES, contracts=False)
+def write_rows(
+    writer: IRWriter,
+    formula: RecordedFormula,
+    varying: Sequence[tuple[int, ...]],
+    still: Sequence[int],
+    results: Sequence[tuple[int, ...]],
+) -> None:
+    """run(vectors, stride, varying, still, results): entries that vary and results in rows `stride` apart.
+
+    `varying` and `still` are the keys of inputs, `results` values of the formula. A row has one of them at every
+    position, or two beside each other, as the parts of complex numbers are.
+    """
     writer.write_line(
-        "define void @run(i64 %vectors, i64 %stride, ptr readonly %varying, ptr readonly %still, ptr %results) {"
+        "define void @run(i64 %vectors, i64 %stride, ptr noalias readonly %varying, ptr readonly %still, "
+        "ptr noalias %results) {"
     )
     writer.write_label("entry")
-    places: list[tuple[bool, int]] = []
-    rows = [0, 0]
-    for count, is_varying in zip(argument_counts, varies, strict=True):
-        places += [(is_varying, rows[is_varying] + k) for k in range(count)]
-        rows[is_varying] += count
-    inputs: dict[int, str] = {}
-    bases: dict[int, str] = {}
-    keys = [(number, value.key) for number, value in enumerate(formula.instructions) if value.key is not None]
-    for number, key in keys:
-        is_varying, place = places[key]
-        if is_varying:
-            bases[number] = writer.add_instruction(f"mul i64 %stride, {place}")
-        else:
-            one = writer.add_instruction(f"load double, ptr {writer.double_pointer('%still', str(place))}")
-            inputs[number] = writer.broadcast(one)
-    targets = [writer.add_instruction(f"mul i64 %stride, {place}") for place in range(len(formula.results))]
+    by_key: dict[int, str] = {}
+    for index, key in enumerate(still):
+        number = writer.add_instruction(f"load double, ptr {writer.double_pointer('%still', str(index))}")
+        by_key[key] = writer.broadcast(number)
+
     writer.write_line("br label %vector")
     writer.write_label("vector")
     writer.write_line("%v = phi i64 [0, %entry], [%vnext, %vector]")
-    writer.write_line(f"%first = mul i64 %v, {LANES}")
-    for number, base in bases.items():
-        index = writer.add_instruction(f"add i64 {base}, %first")
-        inputs[number] = writer.load(writer.double_pointer("%varying", index))
+    first = {width: writer.add_instruction(f"mul i64 %v, {width * LANES}") for width in (1, 2)}
+
+    def pointer(base: str, row: int, width: int) -> str:
+        return writer.row_pointer(base, "%stride", width * row, first[width])
+
+    for row, keys in enumerate(varying):
+        place = pointer("%varying", row, len(keys))
+        values = writer.load_pairs(place) if len(keys) == 2 else (writer.load(place),)
+        by_key |= zip(keys, values, strict=True)
+    inputs = {k: by_key[value.key] for k, value in enumerate(formula.instructions) if value.key is not None}
     names: dict[int, str] = {}
     writer.write_values(formula, range(len(formula.instructions)), names, inputs)
-    for base, result in zip(targets, formula.results, strict=True):
-        index = writer.add_instruction(f"add i64 {base}, %first")
-        writer.store(names[result], writer.double_pointer("%results", index))
+    for row, parts in enumerate(results):
+        place = pointer("%results", row, len(parts))
+        if len(parts) == 2:
+            writer.store_pairs(names[parts[0]], names[parts[1]], place)
+        else:
+            writer.store(names[parts[0]], place)
     writer.close_loop("v", "vectors", "vector", "done")
     writer.write_label("done")
     writer.write_line("ret void")
     writer.write_line("}")
-    return writer.module_text()

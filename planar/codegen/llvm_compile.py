@@ -25,10 +25,10 @@ WIDEST_VECTOR_BYTES = 64
 
 def allocate_aligned(steps: int, rows: int, designs: int, dtype: DTypeLike = np.float64) -> Array:
     """An array (steps, rows, designs), not filled, every row of which begins at a whole vector."""
-    many = WIDEST_VECTOR_BYTES // np.dtype(dtype).itemsize
-    width = -(-designs // many) * many
-    made = np.empty(steps * rows * width + many, dtype)
-    first = -(made.ctypes.data // made.itemsize) % many
+    lanes = WIDEST_VECTOR_BYTES // np.dtype(dtype).itemsize
+    width = -(-designs // lanes) * lanes
+    made = np.empty(steps * rows * width + lanes, dtype)
+    first = -(made.ctypes.data // made.itemsize) % lanes
     return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
 
 
@@ -52,20 +52,15 @@ C_TYPES: Mapping[str, type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]] 
 @lru_cache(maxsize=64)
 def compile_function(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
-    engine = _load_or_compile(text)
-    function: Any = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
-    function.engine = engine  # what was compiled lives as long as the function
-    return function
-
-
-def _load_or_compile(text: str) -> Any:
-    """The text's machine code, from the disk or new."""
     key = fingerprint(text)
-    code = MACHINE_CODE.read(key)
+    code = MACHINE_CODE.read(key)  # from the disk, or new
     if code is None:
         code = _compile_object(text)
         MACHINE_CODE.write(key, code)
-    return _load_object(code)
+    engine = _load_object(code)
+    function: Any = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
+    function.engine = engine  # what was compiled lives as long as the function
+    return function
 
 
 def fingerprint(text: str) -> str:
@@ -116,8 +111,8 @@ def _compile_object(text: str) -> bytes:
 
 def _load_object(code: bytes) -> Any:
     """Machine code ready to run; LLVM does not look whether it is any."""
-    held = llvm.ObjectFileRef.from_data(code)
+    object_file = llvm.ObjectFileRef.from_data(code)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine(CODEGEN_LEVEL))
-    engine.add_object_file(held)
+    engine.add_object_file(object_file)
     engine.finalize_object()
     return engine

@@ -9,7 +9,7 @@ from math import factorial, pi
 from planar.foundation.instruction_list import Instructions, UnsupportedOperation
 
 LLVM_OPERATIONS = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}
+LLVM_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor", "minnum": "minnum", "maxnum": "maxnum"}
 LLVM_COMPARISONS = {"less": "olt", "most": "ole"}
 """What gives 1 where it is true, else 0."""
 LIBRARY_ARGUMENT_COUNTS = {"cos": 1, "sin": 1, "tan": 1, "atan": 1, "atan2": 2, "pow": 2}
@@ -48,9 +48,9 @@ class IRWriter:
     @contextmanager
     def hoisted(self) -> Iterator[None]:
         """What is written meanwhile stands where the last mark is."""
-        here, self.lines = self.lines, self._ahead
+        lines, self.lines = self.lines, self._ahead
         yield
-        self.lines = here
+        self.lines = lines
 
     def add_instruction(self, text: str) -> str:
         """Add an instruction that gives a value; the value's name."""
@@ -74,17 +74,17 @@ class IRWriter:
         return self.add_instruction(f"{LLVM_OPERATIONS[what]} {self._flags}{self.vector} {a}, {b}")
 
     def call_intrinsic(self, what: str, *of: str) -> str:
-        args = ", ".join(f"{self.vector} {each}" for each in of)
+        args = ", ".join(f"{self.vector} {value}" for value in of)
         return self.add_instruction(f"call contract {self.vector} @llvm.{what}.v{self.lanes}f64({args})")
 
     def call_per_lane(self, what: str, *of: str) -> str:
         """A function of the mathematics library, called lane by lane."""
-        found = "poison"
+        result = "poison"
         for lane in range(self.lanes):
             ones = [self.add_instruction(f"extractelement {self.vector} {value}, i64 {lane}") for value in of]
-            one = self.add_instruction(f"call double @{what}({', '.join(f'double {each}' for each in ones)})")
-            found = self.add_instruction(f"insertelement {self.vector} {found}, double {one}, i64 {lane}")
-        return found
+            one = self.add_instruction(f"call double @{what}({', '.join(f'double {number}' for number in ones)})")
+            result = self.add_instruction(f"insertelement {self.vector} {result}, double {one}, i64 {lane}")
+        return result
 
     def load(self, pointer: str) -> str:
         return self.add_instruction(f"load {self.vector}, ptr {pointer}, align 8")
@@ -114,17 +114,15 @@ class IRWriter:
         )
         self.write_line(f"store {both} {pairs}, ptr {pointer}, align 8")
 
-    def store_streaming(self, value: str, pointer: str) -> None:
-        """Store what is not read again soon, past the caches; where whole vectors begin."""
-        self._store_streaming(self.vector, value, pointer)
+    def store_streaming(self, value: str, pointer: str, vector: str | None = None) -> None:
+        """Store what is not read again soon, past the caches; where whole vectors begin. `vector` is its type, by
+        default doubles."""
+        self.write_line(f"store {vector or self.vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
 
     def store_streaming_rounded(self, value: str, pointer: str) -> None:
         """The same, each number rounded once to single precision."""
         single = f"<{self.lanes} x float>"
-        self._store_streaming(single, self.add_instruction(f"fptrunc {self.vector} {value} to {single}"), pointer)
-
-    def _store_streaming(self, vector: str, value: str, pointer: str) -> None:
-        self.write_line(f"store {vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
+        self.store_streaming(self.add_instruction(f"fptrunc {self.vector} {value} to {single}"), pointer, single)
 
     def close_loop(self, counter: str, last: str, again: str, after: str) -> None:
         """Count on, and go round again up to the last."""
@@ -134,10 +132,10 @@ class IRWriter:
 
     def add_all(self, of: Sequence[str]) -> str:
         """The sum of values."""
-        found = of[0]
-        for each in of[1:]:
-            found = self.binary("add", found, each)
-        return found
+        total = of[0]
+        for value in of[1:]:
+            total = self.binary("add", total, value)
+        return total
 
     def compare(self, how: str, a: str, b: str) -> str:
         """A flag in every lane."""
@@ -170,9 +168,9 @@ class IRWriter:
         """The greater of two values; the other where one is not a number."""
         return self.select(self.compare("ogt", value, other), value, other)
 
-    def allocate(self, many: int = 1) -> str:
+    def allocate(self, count: int = 1) -> str:
         """Room for values."""
-        return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")
+        return self.add_instruction(f"alloca {self.vector}, i64 {count}, align 64")
 
     def allocate_flags(self) -> str:
         """Room for a flag in every lane."""
@@ -206,22 +204,22 @@ class IRWriter:
             return self.add_instruction(f"shufflevector <{lanes} x i64> {vector}, <{lanes} x i64> poison, {mask}")
 
         begin = spread(self.add_instruction(f"insertelement <{lanes} x i64> poison, i64 {first}, i64 0"))
-        own = self.add_instruction(f"add <{lanes} x i64> {begin}, <{', '.join(f'i64 {k}' for k in range(lanes))}>")
-        return self.add_instruction(f"icmp sge <{lanes} x i64> {own}, {spread(last)}")
+        numbers = self.add_instruction(f"add <{lanes} x i64> {begin}, <{', '.join(f'i64 {k}' for k in range(lanes))}>")
+        return self.add_instruction(f"icmp sge <{lanes} x i64> {numbers}, {spread(last)}")
 
     def module_text(self, *others: IRWriter) -> str:
         """All that was written, ahead of it what others wrote, with what it calls."""
         calls = {
-            f"declare double @{name}({', '.join(['double'] * many)}) memory(none)"
-            for name, many in LIBRARY_ARGUMENT_COUNTS.items()
+            f"declare double @{name}({', '.join(['double'] * count)}) memory(none)"
+            for name, count in LIBRARY_ARGUMENT_COUNTS.items()
         }
-        for lanes in {each.lanes for each in (self, *others)}:
+        for lanes in {writer.lanes for writer in (self, *others)}:
             v, of = f"<{lanes} x double>", f"v{lanes}f64"
             calls |= {f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs", "floor")}
             calls |= {f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum", "copysign")}
             calls |= {f"declare double @llvm.vector.reduce.{name}.{of}({v})" for name in ("fmin", "fmax")}
             calls.add(f"declare double @llvm.vector.reduce.fadd.{of}(double, {v})")
-        lines = [line for each in (*others, self) for section in each._sections for line in section]
+        lines = [line for writer in (*others, self) for section in writer._sections for line in section]
         return "\n".join([*map(_with_aligned_stack, lines), *sorted(calls), "!0 = !{i32 1}"])
 
     def reduce(self, what: str, value: str) -> str:
@@ -259,30 +257,28 @@ class IRWriter:
         self, listing: Instructions, order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]
     ) -> None:
         """Write values in an order; `names` grows by theirs, those of inputs are known."""
-        for each in order:
-            value = listing.instructions[each]
+        for number in order:
+            value = listing.instructions[number]
             of = [names[k] for k in value.operands]
             if value.operation == "input":
-                names[each] = inputs[each]
+                names[number] = inputs[number]
             elif value.operation == "const":
-                names[each] = self.constant(value.number)
+                names[number] = self.constant(value.number)
             elif value.operation == "neg":
-                names[each] = self.add_instruction(f"fneg {self.vector} {of[0]}")
+                names[number] = self.add_instruction(f"fneg {self.vector} {of[0]}")
             elif value.operation in LLVM_OPERATIONS:
-                names[each] = self.binary(value.operation, *of)
-            elif value.operation in ("minnum", "maxnum"):
-                names[each] = self.call_intrinsic(value.operation, *of)
+                names[number] = self.binary(value.operation, *of)
             elif value.operation in LIBRARY_ARGUMENT_COUNTS:
-                names[each] = self.call_per_lane(value.operation, *of)
+                names[number] = self.call_per_lane(value.operation, *of)
             elif value.operation in LLVM_COMPARISONS:
                 is_true = self.compare(LLVM_COMPARISONS[value.operation], *of)
-                names[each] = self.select(is_true, self.constant(1.0), self.constant(0.0))
+                names[number] = self.select(is_true, self.constant(1.0), self.constant(0.0))
             elif value.operation == "not":
-                names[each] = self.binary("sub", self.constant(1.0), of[0])
+                names[number] = self.binary("sub", self.constant(1.0), of[0])
             elif value.operation == "where":
-                names[each] = self.select_or_zero(self.compare("une", of[0], self.constant(0.0)), of[1])
+                names[number] = self.select_or_zero(self.compare("une", of[0], self.constant(0.0)), of[1])
             elif value.operation in LLVM_INTRINSICS:
-                names[each] = self.call_intrinsic(LLVM_INTRINSICS[value.operation], *of)
+                names[number] = self.call_intrinsic(LLVM_INTRINSICS[value.operation], *of)
             else:
                 raise UnsupportedOperation(f"there is no {value.operation} on vectors")
 
@@ -320,9 +316,9 @@ def write_cos_sin(t: IRWriter, angle: str) -> tuple[str, str]:
     cos_series = _write_polynomial(t, square, [(-1.0) ** k / factorial(2 * k) for k in range(SERIES_TERMS + 1)])
     tail = _write_polynomial(t, square, [(-1.0) ** k / factorial(2 * k + 1) for k in range(1, SERIES_TERMS)])
     sin_series = t.binary("add", rest, t.binary("mul", t.binary("mul", rest, square), tail))
-    whole = f"<{t.lanes} x i64>"
-    quarter = t.add_instruction(f"bitcast {t.vector} {shifted} to {whole}")
-    after = t.add_instruction(f"add {whole} {quarter}, {_spread(t, 1)}")
+    integers = f"<{t.lanes} x i64>"
+    quarter = t.add_instruction(f"bitcast {t.vector} {shifted} to {integers}")
+    after = t.add_instruction(f"add {integers} {quarter}, {_spread(t, 1)}")
     is_odd = _write_bit_test(t, quarter, 1)
     cos, sin = t.select(is_odd, sin_series, cos_series), t.select(is_odd, cos_series, sin_series)
     turned = ((cos, _write_bit_test(t, after, 2)), (sin, _write_bit_test(t, quarter, 2)))
@@ -333,16 +329,16 @@ def write_cos_sin(t: IRWriter, angle: str) -> tuple[str, str]:
 def _write_polynomial(t: IRWriter, x: str, coefficients: Sequence[float]) -> str:
     """A polynomial by its coefficients, the constant one first."""
     value = t.constant(coefficients[-1])
-    for each in coefficients[-2::-1]:
-        value = t.binary("add", t.binary("mul", value, x), t.constant(each))
+    for coefficient in coefficients[-2::-1]:
+        value = t.binary("add", t.binary("mul", value, x), t.constant(coefficient))
     return value
 
 
 def _write_bit_test(t: IRWriter, numbers: str, bit: int) -> str:
     """Whether a bit is set, in every lane."""
-    whole = f"<{t.lanes} x i64>"
-    masked = t.add_instruction(f"and {whole} {numbers}, {_spread(t, bit)}")
-    return t.add_instruction(f"icmp ne {whole} {masked}, zeroinitializer")
+    integers = f"<{t.lanes} x i64>"
+    masked = t.add_instruction(f"and {integers} {numbers}, {_spread(t, bit)}")
+    return t.add_instruction(f"icmp ne {integers} {masked}, zeroinitializer")
 
 
 def _spread(t: IRWriter, number: int) -> str:

@@ -6,198 +6,10 @@ Gram-Schmidt orthogonalization, BIT 7, 1967), which needs no pivot: every lane h
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from string import Template
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from planar.codegen.llvm_ir import IRWriter
-
-_FUNCTIONS = Template("""
-define internal void @orthogonalise(i64 %n, ptr noalias %q, ptr noalias %r, ptr noalias %least) {
-entry:
-  br label %lengths
-lengths:
-  %a = phi i64 [0, %entry], [%anext, %lengthend]
-  %afirst = mul i64 %a, %n
-  br label %square
-square:
-  %b = phi i64 [0, %lengths], [%bnext, %square]
-  %bsum = phi $v [zeroinitializer, %lengths], [%bsumnext, %square]
-  %bat = add i64 %afirst, %b
-  %bp = getelementptr $v, ptr %q, i64 %bat
-  %bq = load $v, ptr %bp, align 64
-  %bqq = fmul contract $v %bq, %bq
-  %bsumnext = fadd contract $v %bsum, %bqq
-  %bnext = add i64 %b, 1
-  %bmore = icmp slt i64 %bnext, %n
-  br i1 %bmore, label %square, label %lengthend
-lengthend:
-  %alast = add i64 %afirst, %a
-  %ap = getelementptr $v, ptr %r, i64 %alast
-  store $v %bsumnext, ptr %ap, align 64
-  %anext = add i64 %a, 1
-  %amore = icmp slt i64 %anext, %n
-  br i1 %amore, label %lengths, label %columns
-columns:
-  %k = phi i64 [0, %lengthend], [%knext, %columnend]
-  %small = phi $v [splat (double 1.0), %lengthend], [%smallnext, %columnend]
-  %kfirst = mul i64 %k, %n
-  br label %norm
-norm:
-  %c = phi i64 [0, %columns], [%cnext, %norm]
-  %csum = phi $v [zeroinitializer, %columns], [%csumnext, %norm]
-  %cat = add i64 %kfirst, %c
-  %cp = getelementptr $v, ptr %q, i64 %cat
-  %cq = load $v, ptr %cp, align 64
-  %cqq = fmul contract $v %cq, %cq
-  %csumnext = fadd contract $v %csum, %cqq
-  %cnext = add i64 %c, 1
-  %cmore = icmp slt i64 %cnext, %n
-  br i1 %cmore, label %norm, label %normed
-normed:
-  %kat = add i64 %kfirst, %k
-  %kp = getelementptr $v, ptr %r, i64 %kat
-  %length = load $v, ptr %kp, align 64
-  %ratio = fdiv contract $v %csumnext, %length
-  %smallnext = call contract $v @llvm.minnum.$f($v %small, $v %ratio)
-  %root = call contract $v @llvm.sqrt.$f($v %csumnext)
-  %inverse = fdiv contract $v splat (double 1.0), %root
-  store $v %inverse, ptr %kp, align 64
-  %after = add i64 %k, 1
-  br label %scale
-scale:
-  %d = phi i64 [0, %normed], [%dnext, %scale]
-  %dat = add i64 %kfirst, %d
-  %dp = getelementptr $v, ptr %q, i64 %dat
-  %dq = load $v, ptr %dp, align 64
-  %dn = fmul contract $v %dq, %inverse
-  store $v %dn, ptr %dp, align 64
-  %dnext = add i64 %d, 1
-  %dmore = icmp slt i64 %dnext, %n
-  br i1 %dmore, label %scale, label %others
-others:
-  %j = phi i64 [%after, %scale], [%jnext, %otherend]
-  %jmore = icmp slt i64 %j, %n
-  br i1 %jmore, label %otherfirst, label %columnend
-otherfirst:
-  %jfirst = mul i64 %j, %n
-  br label %dot
-dot:
-  %e = phi i64 [0, %otherfirst], [%enext, %dot]
-  %esum = phi $v [zeroinitializer, %otherfirst], [%esumnext, %dot]
-  %eat = add i64 %kfirst, %e
-  %ep = getelementptr $v, ptr %q, i64 %eat
-  %eq = load $v, ptr %ep, align 64
-  %eatj = add i64 %jfirst, %e
-  %epj = getelementptr $v, ptr %q, i64 %eatj
-  %eqj = load $v, ptr %epj, align 64
-  %eqq = fmul contract $v %eq, %eqj
-  %esumnext = fadd contract $v %esum, %eqq
-  %enext = add i64 %e, 1
-  %emore = icmp slt i64 %enext, %n
-  br i1 %emore, label %dot, label %dotend
-dotend:
-  %rat = add i64 %kfirst, %j
-  %rp = getelementptr $v, ptr %r, i64 %rat
-  store $v %esumnext, ptr %rp, align 64
-  br label %less
-less:
-  %g = phi i64 [0, %dotend], [%gnext, %less]
-  %gat = add i64 %kfirst, %g
-  %gp = getelementptr $v, ptr %q, i64 %gat
-  %gq = load $v, ptr %gp, align 64
-  %gatj = add i64 %jfirst, %g
-  %gpj = getelementptr $v, ptr %q, i64 %gatj
-  %gqj = load $v, ptr %gpj, align 64
-  %gp2 = fmul contract $v %gq, %esumnext
-  %gn = fsub contract $v %gqj, %gp2
-  store $v %gn, ptr %gpj, align 64
-  %gnext = add i64 %g, 1
-  %gmore = icmp slt i64 %gnext, %n
-  br i1 %gmore, label %less, label %otherend
-otherend:
-  %jnext = add i64 %j, 1
-  br label %others
-columnend:
-  %knext = add i64 %k, 1
-  %kmore = icmp slt i64 %knext, %n
-  br i1 %kmore, label %columns, label %done
-done:
-  store $v %smallnext, ptr %least, align 64
-  ret void
-}
-define internal void @substitute(i64 %n, ptr noalias %q, ptr noalias %r, ptr noalias %b, ptr noalias %x) {
-entry:
-  br label %columns
-columns:
-  %k = phi i64 [0, %entry], [%knext, %columnend]
-  %kfirst = mul i64 %k, %n
-  br label %dot
-dot:
-  %e = phi i64 [0, %columns], [%enext, %dot]
-  %esum = phi $v [zeroinitializer, %columns], [%esumnext, %dot]
-  %eat = add i64 %kfirst, %e
-  %ep = getelementptr $v, ptr %q, i64 %eat
-  %eq = load $v, ptr %ep, align 64
-  %epb = getelementptr $v, ptr %b, i64 %e
-  %eb = load $v, ptr %epb, align 64
-  %eqq = fmul contract $v %eq, %eb
-  %esumnext = fadd contract $v %esum, %eqq
-  %enext = add i64 %e, 1
-  %emore = icmp slt i64 %enext, %n
-  br i1 %emore, label %dot, label %less
-less:
-  %g = phi i64 [0, %dot], [%gnext, %less]
-  %gat = add i64 %kfirst, %g
-  %gp = getelementptr $v, ptr %q, i64 %gat
-  %gq = load $v, ptr %gp, align 64
-  %gpb = getelementptr $v, ptr %b, i64 %g
-  %gb = load $v, ptr %gpb, align 64
-  %gp2 = fmul contract $v %gq, %esumnext
-  %gn = fsub contract $v %gb, %gp2
-  store $v %gn, ptr %gpb, align 64
-  %gnext = add i64 %g, 1
-  %gmore = icmp slt i64 %gnext, %n
-  br i1 %gmore, label %less, label %columnend
-columnend:
-  %xp = getelementptr $v, ptr %x, i64 %k
-  store $v %esumnext, ptr %xp, align 64
-  %knext = add i64 %k, 1
-  %kmore = icmp slt i64 %knext, %n
-  br i1 %kmore, label %columns, label %back
-back:
-  %left = phi i64 [%n, %columnend], [%i, %backend]
-  %i = sub i64 %left, 1
-  %ifirst = mul i64 %i, %n
-  %ip = getelementptr $v, ptr %x, i64 %i
-  %iy = load $v, ptr %ip, align 64
-  br label %known
-known:
-  %j = phi i64 [%left, %back], [%jnext, %knownnext]
-  %jsum = phi $v [%iy, %back], [%jsumnext, %knownnext]
-  %jmore = icmp slt i64 %j, %n
-  br i1 %jmore, label %knownnext, label %backend
-knownnext:
-  %jat = add i64 %ifirst, %j
-  %jp = getelementptr $v, ptr %r, i64 %jat
-  %jr = load $v, ptr %jp, align 64
-  %jpx = getelementptr $v, ptr %x, i64 %j
-  %jx = load $v, ptr %jpx, align 64
-  %jrx = fmul contract $v %jr, %jx
-  %jsumnext = fsub contract $v %jsum, %jrx
-  %jnext = add i64 %j, 1
-  br label %known
-backend:
-  %iat = add i64 %ifirst, %i
-  %irp = getelementptr $v, ptr %r, i64 %iat
-  %inverse = load $v, ptr %irp, align 64
-  %ix = fmul contract $v %jsum, %inverse
-  store $v %ix, ptr %ip, align 64
-  %imore = icmp sgt i64 %i, 0
-  br i1 %imore, label %back, label %done
-done:
-  ret void
-}
-""")
 
 
 class LinearSystems:
@@ -227,11 +39,116 @@ class LinearSystems:
         t, count = self.ir, len(right_side)
         for k, value in enumerate(right_side):
             t.store(value, t.element_pointer(self._right, str(k)))
-        pointers = ", ".join(f"ptr {each}" for each in (self._columns, self._triangle, self._right, self._solution))
+        pointers = ", ".join(f"ptr {slot}" for slot in (self._columns, self._triangle, self._right, self._solution))
         t.write_line(f"call void @substitute(i64 {count}, {pointers})")
         return [t.load(t.element_pointer(self._solution, str(k))) for k in range(count)]
 
     @property
     def function_text(self) -> str:
         """The functions that are called."""
-        return _FUNCTIONS.substitute(v=self.ir.vector, f=f"v{self.ir.lanes}f64")
+        return "\n".join([*_orthogonalise(self.ir.lanes), *_substitute(self.ir.lanes)])
+
+
+class _LoopWriter(IRWriter):
+    """A function of arrays of vectors that is written loop after loop."""
+
+    def __init__(self, lanes: int, name: str, arrays: Sequence[str]):
+        super().__init__(lanes)
+        self._block, self._loop_count = "entry", 0
+        parameters = ", ".join(f"ptr noalias {array}" for array in arrays)
+        self.write_line(f"define internal void @{name}(i64 %n, {parameters}) {{")
+        self.write_label(self._block)
+        self._sum = self.allocate()
+
+    @contextmanager
+    def loop(self, first: str = "0") -> Iterator[str]:
+        """What is written meanwhile is done for every index from `first` up to n."""
+        self._loop_count += 1
+        name = f"loop{self._loop_count}"
+        self.write_line(f"br label %{name}")
+        self.write_label(name)
+        self.write_line(f"%{name}k = phi i64 [{first}, %{self._block}], [%{name}next, %{name}latch]")
+        self.write_line(f"%{name}more = icmp slt i64 %{name}k, %n")
+        self.write_line(f"br i1 %{name}more, label %{name}body, label %{name}done")
+        self._enter(f"{name}body")
+        yield f"%{name}k"
+        self.write_line(f"br label %{name}latch")
+        self.write_label(f"{name}latch")
+        self.write_line(f"%{name}next = add i64 %{name}k, 1")
+        self.write_line(f"br label %{name}")
+        self._enter(f"{name}done")
+
+    def _enter(self, block: str) -> None:
+        self.write_label(block)
+        self._block = block
+
+    def integer(self, operation: str, a: str, b: str) -> str:
+        """A sum, difference or product of indices."""
+        return self.add_instruction(f"{operation} i64 {a}, {b}")
+
+    def entry(self, array: str, *place: str) -> str:
+        """A pointer to an entry of a vector, or by column and row to one of a matrix of n rows."""
+        index = place[0] if len(place) == 1 else self.integer("add", self.integer("mul", place[0], "%n"), place[1])
+        return self.element_pointer(array, index)
+
+    def dot(self, a: str, column: str, b: str, *other: str) -> str:
+        """The product of a column of one matrix with one of another, or with a vector."""
+        self.store("zeroinitializer", self._sum)
+        with self.loop() as k:
+            product = self.binary("mul", self.load(self.entry(a, column, k)), self.load(self.entry(b, *other, k)))
+            self.store(self.binary("add", self.load(self._sum), product), self._sum)
+        return self.load(self._sum)
+
+    def subtract_column(self, a: str, column: str, factor: str, b: str, *other: str) -> None:
+        """Take a multiple of a column of one matrix off one of another, or off a vector."""
+        with self.loop() as k:
+            pointer = self.entry(b, *other, k)
+            product = self.binary("mul", self.load(self.entry(a, column, k)), factor)
+            self.store(self.binary("sub", self.load(pointer), product), pointer)
+
+    def end(self) -> list[str]:
+        """The lines of the function."""
+        self.write_line("ret void")
+        self.write_line("}")
+        return self.lines
+
+
+def _orthogonalise(lanes: int) -> list[str]:
+    """The columns q made orthonormal; the triangle r, the inverses of its diagonal on it, and the `least` squared ratio
+    of a column's part across those before it, beside one."""
+    t = _LoopWriter(lanes, "orthogonalise", ("%q", "%r", "%least"))
+    with t.loop() as column:
+        t.store(t.dot("%q", column, "%q", column), t.entry("%r", column, column))
+    t.store(t.constant(1.0), "%least")
+    with t.loop() as column:
+        squared_length, diagonal = t.dot("%q", column, "%q", column), t.entry("%r", column, column)
+        ratio = t.binary("div", squared_length, t.load(diagonal))
+        t.store(t.call_intrinsic("minnum", t.load("%least"), ratio), "%least")
+        inverse = t.binary("div", t.constant(1.0), t.call_intrinsic("sqrt", squared_length))
+        t.store(inverse, diagonal)
+        with t.loop() as k:
+            pointer = t.entry("%q", column, k)
+            t.store(t.binary("mul", t.load(pointer), inverse), pointer)
+        with t.loop(t.integer("add", column, "1")) as other:
+            along = t.dot("%q", column, "%q", other)
+            t.store(along, t.entry("%r", column, other))
+            t.subtract_column("%q", column, along, "%q", other)
+    return t.end()
+
+
+def _substitute(lanes: int) -> list[str]:
+    """The solution x of q r x = b; b is changed."""
+    t = _LoopWriter(lanes, "substitute", ("%q", "%r", "%b", "%x"))
+    with t.loop() as column:
+        along = t.dot("%q", column, "%b")
+        t.subtract_column("%q", column, along, "%b")
+        t.store(along, t.entry("%x", column))
+    last = t.integer("sub", "%n", "1")
+    with t.loop() as step:
+        row = t.integer("sub", last, step)
+        pointer = t.entry("%x", row)
+        with t.loop(t.integer("add", row, "1")) as column:
+            known = t.binary("mul", t.load(t.entry("%r", row, column)), t.load(t.entry("%x", column)))
+            t.store(t.binary("sub", t.load(pointer), known), pointer)
+        t.store(t.binary("mul", t.load(pointer), t.load(t.entry("%r", row, row))), pointer)
+    return t.end()

@@ -38,7 +38,7 @@ from planar.dynamics.external_actions import (
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_variation import course_piece
 from planar.dynamics.reaction_solver import bearing_point
-from planar.equations.element_groups import ElementGroup, group_elements
+from planar.equations.elements import ElementGroup, group_elements
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.generalised_inverses import invert_matrices
 from planar.foundation.geometry import Vector

@@ -24,8 +24,7 @@ from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
 from planar.equations.coordinates import consecutive_ranges
-from planar.equations.element_groups import ElementGroup, group_elements, pattern_of_groups
-from planar.equations.elements import PlacedElement
+from planar.equations.elements import ElementGroup, PlacedElement, group_elements, pattern_of_groups
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
-from planar.equations.element_placement import ElementPlacement
+from planar.equations.elements import ElementPlacement
 from planar.foundation.arrays import Array
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import Spring

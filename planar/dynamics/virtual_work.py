@@ -17,9 +17,7 @@ from planar.dynamics.external_actions import (
     passive_actions,
 )
 from planar.dynamics.link_coordinates import LinkCoordinates
-from planar.equations.element_groups import ElementGroup, group_elements
-from planar.equations.element_placement import ElementPlacement
-from planar.equations.elements import Element, PlacedElement
+from planar.equations.elements import Element, ElementGroup, ElementPlacement, PlacedElement, group_elements
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.residuals import wrapped_residual
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern

@@ -28,18 +28,15 @@ coordinates           what stands in w, and the frames of links that it makes
 mechanism_numbers     structure, size and numbers p of a mechanism
 residuals             the residuals of all pairs and inputs, for every arithmetic
 linear                small linear systems, as expressions and for arrays
-elements              the formulas of pairs: linear part, rest, derivatives
-element_placement     which elements a mechanism has, and where
-element_derivation    elements derived by casadi
-known_types           elements and block types that are kept with the package
+elements              the formulas of pairs: linear part, rest, derivatives; where a mechanism has them, and in groups
 elimination           coordinates that enter rows with constant factors are solved for
 symbolic_equations    structure, unknowns, rows and blocks; z, u, p, w, F as casadi expressions where they are needed
 assembled_equations   F, w, rates and Jacobians from the elements by index arrays, at any number of samples
 block_types           blocks by their own equations, placed by indices
 block_type_functions  residuals, coordinates, closed form, motion and runs of a block type
 block_motion          the coordinates of a block type with their rates, and how regular it is
-large_block_motion    the same of a block of many unknowns
-placed_blocks         the functions of block types, called with z, u and p of the whole
+closed_form           both assemblies of a block of two unknowns, derived from its equations
+placed_blocks         the functions of blocks, called with z, u and p of the whole
 rates                 time derivatives of expressions in y, and of the unknowns
 functions             F, w, rates and Jacobians by elements, or as compiled functions of the whole, kept on disk
 constraint_check      every constraint with its rates by its pair's own formula, pairs of equal formula together

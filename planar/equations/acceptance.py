@@ -13,8 +13,7 @@ import numpy as np
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import INPUT_BLOCK, PlacedBlock, place_input_coordinates
-from planar.equations.constraint_check import ORDERS, ConstraintCheck
-from planar.equations.coordinates import coordinate_columns
+from planar.equations.constraint_check import ORDERS, ConstraintCheck, constraint_check
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
@@ -96,15 +95,6 @@ class RecordedStep(NamedTuple):
     judged: JudgedPositions
 
 
-class _BlockMotion(NamedTuple):
-    """The coordinates and inputs with their rates (3, entries, samples), what blocks leave open (rows, samples), and
-    of every block the regularity, least singular value, loss by round-off and distance (4, blocks, samples)."""
-
-    entries: Array
-    open_rows: Array
-    judged: Array
-
-
 class AcceptanceFunctions:
     """Computes and judges positions of one structure. Only for structures whose every block is of a type, with as many
     constraints as unknowns."""
@@ -125,41 +115,43 @@ class AcceptanceFunctions:
         self._call_count = 0
 
     @cached_property
+    def check(self) -> ConstraintCheck:
+        """The check of all constraints."""
+        return constraint_check(self.structure, len(self.equations.coordinates))
+
+    @cached_property
     def _blocks(self) -> list[tuple[Block, PlacedBlock, BlockTypeFunctions]]:
         """The blocks in their order, those first that follow from the inputs alone."""
         return [(block, placed, block_type_functions(placed.key)) for block, placed in self._placed]
 
-    @cached_property
-    def _check(self) -> ConstraintCheck:
-        return ConstraintCheck(self.structure, coordinate_columns(self.equations.coordinates))
-
-    def position(self, z: Array, given: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
+    def position(self, z: Array, inputs: InputSamples, scales: Scales) -> tuple[Array, AcceptanceResult[float]]:
         """Coordinates with their rates (3, coordinates) at unknowns z (unknowns,), and what is judged of them."""
         self._call_count += 1
         if self.has_one_formula:
-            values = self._fused_position.values(*(argument.tolist() for argument in (z, *given, *scales)))
+            values = self._fused_position.values(*(argument.tolist() for argument in (z, *inputs, *scales)))
             split = ORDERS * len(self.equations.coordinates)
             return np.array(values[:split]).reshape(ORDERS, -1), AcceptanceResult(*values[split : split + RESULT_COUNT])
-        judged = self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales)
+        judged = self.judge(z[None], InputSamples(*(rates[None] for rates in inputs)), scales)
         return judged.coordinate_rates[0], AcceptanceResult(*(float(values[0]) for values in judged.result))
 
-    def judge(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
+    def judge(self, z: Array, inputs: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns)."""
         with np.errstate(all="ignore"):  # what is not defined is not a number, and is not accepted
-            return self._judge(self._move(np.array([rates.T for rates in given]), scales, z=z.T), scales)
+            return self._judge_blocks(z.T, np.array([rates.T for rates in inputs]), scales)
 
-    def run(self, z: Array, given: InputSamples, scales: Scales, at: int = 0) -> tuple[Array, JudgedPositions]:
+    def run(self, z: Array, inputs: InputSamples, scales: Scales, index: int = 0) -> tuple[Array, JudgedPositions]:
         """The unknowns at samples of inputs (samples, unknowns), on the branch of z (unknowns,) at the sample `at`, and
         what is judged of them."""
         self._call_count += 1
         with np.errstate(all="ignore"):
             if self.has_one_formula:
-                samples = self._solve_run(z, given.u, scales.p, at)
-                return samples, self._judge_by_one_formula(samples, given, scales)
-            motion = self._move(np.array([rates.T for rates in given]), scales, start=z, at=at)
-            return motion.entries[0, self.unknown_columns].T, self._judge(motion, scales)
+                samples = self._solve_run(z, inputs.u, scales.p, index)
+                return samples, self._judge_by_one_formula(samples, inputs, scales)
+            samples = np.empty((len(inputs.u), len(z)))
+            rates = np.array([rates.T for rates in inputs])
+            return samples, self._judge_blocks(samples.T, rates, scales, (z, index))
 
-    def _solve_run(self, start: Array, u: Array, p: Array, at: int) -> Array:
+    def _solve_run(self, start: Array, u: Array, p: Array, index: int) -> Array:
         """The unknowns at samples of inputs u (samples, inputs), block after block, on the branch of `start` at one."""
         count = len(self.equations.coordinates)
         entries: Array = np.empty((len(u), count + u.shape[1]))
@@ -167,12 +159,12 @@ class AcceptanceFunctions:
         last = self._blocks[-1][0]
         for block, placed, of_type in self._blocks:
             known, numbers = entries[:, placed.known], p[placed.numbers]
-            own = known[:, :0]
+            unknowns = known[:, :0]
             if slice_length(block.unknowns):
-                own = of_type.run(start[block.unknowns], known, numbers, at)
-                entries[:, self.unknown_columns[block.unknowns]] = own
+                unknowns = of_type.run(start[block.unknowns], known, numbers, index)
+                entries[:, self.unknown_columns[block.unknowns]] = unknowns
             if block is not last:  # nothing follows from its coordinates
-                (coordinates,) = of_type.coordinates.evaluate_batch(len(u), own, known, numbers)
+                (coordinates,) = of_type.coordinates.evaluate_batch(len(u), unknowns, known, numbers)
                 entries[:, placed.coordinates] = coordinates[:, 0]
         return entries[:, self.unknown_columns]
 
@@ -198,12 +190,12 @@ class AcceptanceFunctions:
         assert e.elimination is not None
         return e.elimination.number_count, len(e.rows), len(e.unknowns)
 
-    def record_step(self, signs: Array, near: Array, given: InputSamples, scales: Scales) -> RecordedStep:
+    def record_step(self, signs: Array, near: Array, inputs: InputSamples, scales: Scales) -> RecordedStep:
         """The formula of the position at inputs, blocks in closed form by their signs (blocks,), angles within half a
         turn of those `near` (unknowns,): all of it recorded numbers."""
         e = self.equations
-        entries: Array = np.zeros(len(e.coordinates) + len(given.u), dtype=object)
-        entries[len(e.coordinates) :] = given.u
+        entries: Array = np.zeros(len(e.coordinates) + len(inputs.u), dtype=object)
+        entries[len(e.coordinates) :] = inputs.u
         z, moves = near.copy(), near.copy()
         for k, (block, placed, of_type) in enumerate(self._blocks):
             known, numbers = entries[placed.known], scales.p[placed.numbers]
@@ -215,7 +207,7 @@ class AcceptanceFunctions:
                 z[block.unknowns] = np.where(of_type.is_angle, unknowns + wrap_angle(move), assembly)
             coordinates = of_type.coordinates.evaluate_entries(1, z[block.unknowns], known, numbers)
             entries[placed.coordinates] = coordinates[:, 0]
-        return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in given)), scales))
+        return RecordedStep(z, moves, self.judge(z[None], InputSamples(*(rates[None] for rates in inputs)), scales))
 
     def signs_at(self, coordinates: Array, u: Array, p: Array) -> list[float]:
         """Of every block the sign of its assembly in closed form at a position; 0 of one without unknowns."""
@@ -227,65 +219,52 @@ class AcceptanceFunctions:
             for block, placed, of_type in self._blocks
         ]
 
-    def _judge_by_one_formula(self, z: Array, given: InputSamples, scales: Scales) -> JudgedPositions:
+    def _judge_by_one_formula(self, z: Array, inputs: InputSamples, scales: Scales) -> JudgedPositions:
         """Judge samples z (samples, unknowns) by the formula of all blocks and pairs."""
-        values = self._fused_position.evaluate_entries(len(z), z.T, *(rates.T for rates in given), *scales)
+        values = self._fused_position.evaluate_entries(len(z), z.T, *(rates.T for rates in inputs), *scales)
         split = ORDERS * len(self.equations.coordinates)
         rates = values[:split].reshape(ORDERS, -1, len(z)).transpose(2, 0, 1)
         result = AcceptanceResult(*values[split : split + RESULT_COUNT])
         return JudgedPositions(rates, result, values[split + RESULT_COUNT :].T)
 
-    def _move(
-        self, u: Array, scales: Scales, z: Array | None = None, start: Array | None = None, at: int = 0
-    ) -> _BlockMotion:
-        """All blocks one after the other, each at all samples: from inputs with their rates (3, inputs, samples), at
-        unknowns z (unknowns, samples), or on the branch of `start` (unknowns,) at one of them."""
-        e, samples = self.equations, u.shape[-1]
-        count = len(e.coordinates)
+    def _judge_blocks(
+        self, z: Array, u: Array, scales: Scales, start: tuple[Array, int] | None = None
+    ) -> JudgedPositions:
+        """All blocks one after the other, each at all samples: at unknowns z (unknowns, samples), and inputs u with
+        their rates (3, inputs, samples). With `start`, unknowns at the sample of that number, z is filled: by those on
+        the branch of them."""
+        count, samples = len(self.equations.coordinates), u.shape[-1]
         entries: Array = np.zeros((ORDERS, count + u.shape[1], samples), u.dtype)
         entries[:, count:] = u
         open_rows: list[Array] = []
-        judged: list[Array] = []
+        bounds: list[Array] = []
         for block, placed, of_type in self._blocks:
             known, numbers = entries[:, placed.known], scales.p[placed.numbers]
-            if z is not None:
-                own = z[block.unknowns]
-            else:
-                assert start is not None
-                own = (
-                    of_type.run(start[block.unknowns], known[0].T, numbers, at).T
-                    if slice_length(block.unknowns)
-                    else known[0, :0]
-                )
-            bounds = scales.row_scale[block.rows], scales.column_floor[block.unknowns]
-            results = of_type.motion.evaluate_entries(samples, own, *known, numbers, *bounds)
+            if start is not None and slice_length(block.unknowns):
+                near, index = start
+                z[block.unknowns] = of_type.run(near[block.unknowns], known[0].T, numbers, index).T
+            sizes = scales.row_scale[block.rows], scales.column_floor[block.unknowns]
+            results = of_type.motion.evaluate_entries(samples, z[block.unknowns], *known, numbers, *sizes)
             split = ORDERS * len(placed.coordinates)
             entries[:, placed.coordinates] = results[:split].reshape(ORDERS, -1, samples)
             if slice_length(block.unknowns):
-                open_rows.append(results[split:-4])
+                open_rows.append(np.abs(results[split:-4]))
             if block is not INPUT_BLOCK:
-                judged.append(results[-4:])
-        return _BlockMotion(
-            entries,
-            np.concatenate([*open_rows, 0.0 * entries[0, :0]]),
-            np.array(judged).reshape(len(judged), 4, samples).swapaxes(0, 1),
-        )
-
-    def _judge(self, motion: _BlockMotion, scales: Scales) -> JudgedPositions:
-        coordinates = motion.entries[:, : len(self.equations.coordinates)]
-        closed = self._check.judge(motion.entries, scales.p)
-        regularity, least, loss, distances = motion.judged
+                bounds.append(results[-4:])
+        regularity, least, loss, distances = np.array(bounds).reshape(len(bounds), 4, samples).swapaxes(0, 1)
+        coordinates = entries[:, :count]
+        residual, finite_sum, velocity_error, acceleration_error, contact_gap = self.check.judge(entries, scales.p)
         size = greatest_entries(np.abs(coordinates[0])) / np.pi
-        of_angles = np.stack([0.0 * size + 1.0, size])
+        one = 0.0 * size + 1.0
         result: AcceptanceResult[Array] = AcceptanceResult(
-            greatest_entries(np.concatenate([np.abs(motion.open_rows), closed.residual[None]])),
-            coordinates.sum(axis=(0, 1)) + closed.finite_sum + (regularity + least).sum(axis=0),
-            closed.velocity_error,
-            closed.acceleration_error,
-            closed.contact_gap,
-            least_entries(np.concatenate([of_angles[:1], regularity])),
-            least_entries(np.concatenate([of_angles[:1], least])),
-            greatest_entries(np.concatenate([of_angles[:1], loss])) * greatest_entries(of_angles),
+            greatest_entries(np.concatenate([*open_rows, residual[None]])),
+            coordinates.sum(axis=(0, 1)) + finite_sum + (regularity + least).sum(axis=0),
+            velocity_error,
+            acceleration_error,
+            contact_gap,
+            least_entries(np.concatenate([one[None], regularity])),
+            least_entries(np.concatenate([one[None], least])),
+            greatest_entries(np.concatenate([one[None], loss])) * greatest_entries(np.stack([one, size])),
         )
         return JudgedPositions(coordinates.transpose(2, 0, 1), result, distances.T)
 

@@ -46,75 +46,36 @@ class Elimination(NamedTuple):
     number_count: int
 
 
-class _Combinations(NamedTuple):
-    """Sums of the form: coefficient times an entry of x, in the order of their results, `starts` are the first terms
-    of every result, `results` their places."""
+class _Sums(NamedTuple):
+    """Sums of products of a factor and an entry of x, in the order of their results: `starts` are the first terms of
+    every result, `results` their places. Factors are numbers, or the places of entries of another array."""
 
     results: IntArray
     starts: IntArray
     sources: IntArray
-    coefficients: Array
+    factors: Any
+    "numbers, or places (terms,)"
 
-    def set_in(self, target: Array, x: Array) -> None:
-        """Set the results in target (..., entries) from x (..., entries)."""
-        if len(self.results):
-            target[..., self.results] = np.add.reduceat(self.coefficients * x[..., self.sources], self.starts, axis=-1)
+    def values(self, x: Array, entries: Array | None = None) -> Array:
+        """The results (..., results) of x (..., entries), of whose array factors are `entries` (..., entries)."""
+        factors = self.factors if entries is None else entries[..., self.factors]
+        sums: Array = np.add.reduceat(factors * x[..., self.sources], self.starts, axis=-1)
+        return sums
 
-    def matrix(self, shape: tuple[int, int]) -> csr_matrix:
-        """The matrix (results, x) of the sums."""
-        rows = np.repeat(self.results, np.diff(self.starts, append=len(self.sources)))
-        return _sparse_matrix(shape, self.coefficients, rows, self.sources)
-
-
-def _sparse_matrix(shape: tuple[int, int], values: Array, rows: IntArray, columns: IntArray) -> csr_matrix:
-    from scipy.sparse import csr_matrix  # few mechanisms are so large
-
-    return csr_matrix((values, (rows, columns)), shape=shape)
-
-
-def _starts(lengths: Iterable[int]) -> IntArray:
-    """The places of the first terms of sums of so many terms each."""
-    starts: IntArray = np.cumsum([0, *lengths])[:-1]
-    return starts
-
-
-def _combinations(terms: Iterable[tuple[int, Mapping[int, float]]]) -> _Combinations:
-    filled = [(result, sums) for result, sums in terms if sums]
-    return _Combinations(
-        np.array([result for result, _ in filled], dtype=int),
-        _starts(len(sums) for _, sums in filled),
-        np.array([source for _, sums in filled for source in sums], dtype=int),
-        np.array([value for _, sums in filled for value in sums.values()], dtype=float),
-    )
-
-
-class _Products(NamedTuple):
-    """Sums of products: of an entry of a and an entry of b, in the order of their results."""
-
-    results: IntArray
-    starts: IntArray
-    left: IntArray
-    right: IntArray
-
-    def set_in(self, target: Array, a: Array, b: Array) -> None:
+    def set_in(self, target: Array, x: Array, entries: Array | None = None) -> None:
         """Set the results in target (..., entries)."""
         if len(self.results):
-            products = a[..., self.left] * b[..., self.right]
-            target[..., self.results] = np.add.reduceat(products, self.starts, axis=-1)
-
-    def matrix(self, shape: tuple[int, int], a: Array) -> csr_matrix:
-        """The matrix (results, b) of the sums for one sample of a."""
-        rows = np.repeat(self.results, np.diff(self.starts, append=len(self.left)))
-        return _sparse_matrix(shape, a[self.left], rows, self.right)
+            target[..., self.results] = self.values(x, entries)
 
 
-def _products(terms: Sequence[tuple[int, Sequence[tuple[int, int]]]]) -> _Products:
-    """Sums by their results, each of pairs of an entry of a and one of b."""
-    return _Products(
-        np.array([result for result, _ in terms], dtype=int),
-        _starts(len(pairs) for _, pairs in terms),
-        np.array([left for _, pairs in terms for left, _ in pairs], dtype=int),
-        np.array([right for _, pairs in terms for _, right in pairs], dtype=int),
+def _sums(terms: Iterable[tuple[int, Iterable[tuple[int, float]]]], factor_type: type = float) -> _Sums:
+    """Sums by their results, each of pairs of a source and a factor, which is a number or a place."""
+    filled = [(result, pairs) for result, sums in terms if (pairs := list(sums))]
+    return _Sums(
+        np.array([result for result, _ in filled], dtype=int),
+        np.cumsum([0, *(len(pairs) for _, pairs in filled)])[:-1],
+        np.array([source for _, pairs in filled for source, _ in pairs], dtype=int),
+        np.array([factor for _, pairs in filled for _, factor in pairs], dtype=factor_type),
     )
 
 
@@ -167,17 +128,10 @@ class _Stage(NamedTuple):
     """Rests that can be computed, then coordinates that follow from them."""
 
     groups: list[_ElementGroup]
-    rest_rates: _Products
-    "(entries of slopes, s) -> rates of the stage's rests"
-    coordinates: _Combinations
+    rest_rates: _Sums
+    "s, by entries of slopes -> rates of the stage's rests"
+    coordinates: _Sums
     "x -> s"
-
-
-class AssembledJacobians(NamedTuple):
-    """F (samples, rows) and the entries of dF/dy (samples, entries)."""
-
-    residuals: Array
-    entries: Array
 
 
 @dataclass(eq=False)
@@ -215,15 +169,10 @@ class AssembledEquations:
         for column in range(self._coordinate_count, self._state_count):
             self._y_place_of[column] = first_input + column - self._coordinate_count
         self._residual_sums = [self._line_sums(elimination.lines[row]) for row in rows]
-        self._make_slope_entries()
+        self._number_slopes()
         self._make_stages()
         self._last: _Evaluation | None = None
-        self._all_residuals = _combinations(enumerate(self._residual_sums))
-
-    @property
-    def argument_counts(self) -> tuple[int, int, int]:
-        """How many entries z, u and p have."""
-        return len(self._unknowns), self._elimination.input_count, self._elimination.number_count
+        self._all_residuals = _sums((row, sums.items()) for row, sums in enumerate(self._residual_sums))
 
     # sums over x = (y, rests)
 
@@ -245,29 +194,33 @@ class AssembledEquations:
 
     # stages
 
-    def _make_slope_entries(self) -> None:
-        """Number the entries of the derivatives of all rests by s."""
+    def _number_slopes(self) -> None:
+        """Number the entries of the derivatives of all rests by s, and the angles of s whose cos and sin they need."""
         self._slope_count = 0
         self._first_slope: list[int] = []
         self._row_slopes: list[list[tuple[int, int]]] = [[] for _ in range(self._rest_count)]
-        "for every row the numbers of its entries, each with its column in s"
+        "for every row the columns of its entries in s, each with the entry's number"
+        angles: set[int] = set()
         for placed in self._elimination.elements:
             self._first_slope.append(self._slope_count)
             for row, column in placed.element.slope_entries:
-                self._row_slopes[placed.rows[row]].append((self._slope_count, placed.coordinates[column]))
+                self._row_slopes[placed.rows[row]].append((placed.coordinates[column], self._slope_count))
                 self._slope_count += 1
+            taken = placed.element.arguments
+            angles |= {placed.coordinates[3 * body + 2] for body in (*taken.cosines, *taken.sines)}
+        self._angles = np.array(sorted(angles), dtype=int)
 
     def _make_stages(self) -> None:
         """Part rests and the coordinates on which they depend into stages."""
         first = self._coordinate_count
-        needed = {column for entries in self._row_slopes for _, column in entries}
+        needed = {column for entries in self._row_slopes for column, _ in entries}
         level: dict[int, int] = {int(column): 0 for column in self._unknowns}
         row_level: dict[int, int] = {}
         y_count = self._y_count
 
         def level_of_row(row: int) -> int:
             if row not in row_level:
-                columns = (column for _, column in self._row_slopes[row])
+                columns = (column for column, _ in self._row_slopes[row])
                 row_level[row] = max((level[column] for column in columns if column < first), default=0)
             return row_level[row]
 
@@ -279,7 +232,7 @@ class AssembledEquations:
                 sources = [source - y_count for source in sums_of[column] if source >= y_count]
                 level[column] = early[column] = 1 + max(map(level_of_row, sources), default=-1)
         self._start_columns = [*self._unknowns.tolist(), *(column for column, value in early.items() if value == 0)]
-        self._start_coordinates = _combinations((column, sums_of[column]) for column in self._start_columns)
+        self._start_coordinates = self._early_combinations(self._start_columns)
         count = 1 + max([*map(level_of_row, range(self._rest_count)), *early.values()], default=0)
         by_stage: list[dict[Element, list[tuple[PlacedElement, int]]]] = [{} for _ in range(count)]
         for placed, first_slope in zip(self._elimination.elements, self._first_slope, strict=True):
@@ -287,38 +240,32 @@ class AssembledEquations:
                 by_stage[stage].setdefault(placed.element, []).append((placed, first_slope))
         terms: list[list[tuple[int, list[tuple[int, int]]]]] = [[] for _ in range(count)]
         for row, slopes in enumerate(self._row_slopes):
-            if slopes:
-                terms[level_of_row(row)].append((row, slopes))
+            terms[level_of_row(row)].append((row, slopes))
         self._columns_after_stage: list[list[int]] = [[] for _ in range(count)]
         for column, value in early.items():
             if value:
                 self._columns_after_stage[value - 1].append(column)
-        self._find_trigonometric_columns()
         self._stages = [
             _Stage(
                 [self._group(element, places) for element, places in elements.items()],
-                _products(stage_terms),
-                _combinations((column, sums_of[column]) for column in columns),
+                _sums(stage_terms, int),
+                self._early_combinations(columns),
             )
             for elements, stage_terms, columns in zip(by_stage, terms, self._columns_after_stage, strict=True)
         ]
 
-    def _find_trigonometric_columns(self) -> None:
-        """The entries of s whose cosines and sines are needed."""
-        columns: set[int] = set()
-        for placed in self._elimination.elements:
-            for body in {*placed.element.arguments.cosines, *placed.element.arguments.sines}:
-                columns.add(placed.coordinates[3 * body + 2])
-        self._angles = np.array(sorted(columns), dtype=int)
-        self._angle_place = {int(column): k for k, column in enumerate(self._angles)}
+    def _early_combinations(self, columns: Iterable[int]) -> _Sums:
+        """x -> entries of s on which rests depend."""
+        return _sums((column, self._early_sums[column].items()) for column in columns)
 
     def _group(self, element: Element, places: Sequence[tuple[PlacedElement, int]]) -> _ElementGroup:
         taken = element.arguments
         first_cosine = self._state_count
         first_sine, first_number = first_cosine + len(self._angles), first_cosine + 2 * len(self._angles)
+        place_of_angle = {int(column): k for k, column in enumerate(self._angles)}
         arguments = []
         for placed, _ in places:
-            angle_of = [self._angle_place.get(placed.coordinates[3 * k + 2], 0) for k in range(element.body_count)]
+            angle_of = [place_of_angle.get(placed.coordinates[3 * k + 2], 0) for k in range(element.body_count)]
             arguments.append(
                 [
                     *(placed.coordinates[k] for k in taken.coordinates),
@@ -379,7 +326,7 @@ class AssembledEquations:
     def _coordinates(self, x: Array) -> Array:
         """w (samples, coordinates) from x, or the rates of one from those of the other."""
         if x.dtype == object or self._y_count <= MAX_DENSE_SIZE:
-            return self._sums(self._all_coordinates, x, self._coordinate_count)
+            return _all_values(self._all_coordinates, x, self._coordinate_count)
         w: Array = np.zeros((len(x), self._coordinate_count), x.dtype)
         w[:, self._unknowns] = x[:, : len(self._unknowns)]
         solved, right_side, factored = self._factored_coordinates
@@ -388,48 +335,43 @@ class AssembledEquations:
         return w
 
     @cached_property
-    def _all_coordinates(self) -> _Combinations:
+    def _all_coordinates(self) -> _Sums:
         """x -> w."""
-        return _combinations((column, self._state_sums(column)) for column in range(self._coordinate_count))
+        return _sums((column, self._state_sums(column).items()) for column in range(self._coordinate_count))
 
     @cached_property
     def _factored_coordinates(self) -> tuple[IntArray, csr_matrix, SuperLU]:
         """The coordinates that were solved for, in order; what their equations have of x on the right (coordinates, x),
         and the factored matrix of their factors. Of many links sums over x would be long."""
+        from scipy.sparse import csr_matrix  # few mechanisms are so large
         from scipy.sparse.linalg import splu
 
         solved = [column for column, _ in self._elimination.solved]
-        left: list[tuple[int, int, float]] = []
-        right: list[tuple[int, int, float]] = []
+        solved_terms: list[tuple[int, int, float]] = []
+        known_terms: list[tuple[int, int, float]] = []
         for place, (_, line) in enumerate(self._elimination.solved):
             for column, factor in line.factors.items():
                 if column in self._place_of:
-                    left.append((place, self._place_of[column], factor))
+                    solved_terms.append((place, self._place_of[column], factor))
                 else:
-                    right.append((place, self._y_place_of[column], -factor))
-            right += [(place, self._y_count + row, -multiplier) for row, multiplier in line.multipliers.items()]
+                    known_terms.append((place, self._y_place_of[column], -factor))
+            known_terms += [(place, self._y_count + row, -multiplier) for row, multiplier in line.multipliers.items()]
         matrices = []
-        for terms, width in ((left, len(solved)), (right, self._y_count + self._rest_count)):
+        for terms, width in ((solved_terms, len(solved)), (known_terms, self._y_count + self._rest_count)):
             rows, columns, values = (np.array(part) for part in zip(*terms, strict=True))
-            matrices.append(_sparse_matrix((len(solved), width), values, rows, columns))
+            matrices.append(csr_matrix((values, (rows, columns)), shape=(len(solved), width)))
         factored = splu(matrices[0].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0)  # it is triangular
         return np.array(solved, dtype=int), matrices[1], factored
 
-    @staticmethod
-    def _sums(combinations: _Combinations, x: Array, count: int) -> Array:
-        sums: Array = np.zeros((len(x), count), x.dtype)
-        combinations.set_in(sums, x)
-        return sums
-
     def _residuals(self, x: Array) -> Array:
-        residuals = self._sums(self._all_residuals, x, self._row_count)
+        residuals = _all_values(self._all_residuals, x, self._row_count)
         residuals[:, self._angle_rows] = elementwise(wrap_angle, residuals[:, self._angle_rows])
         return residuals
 
-    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
-        """F and the entries of dF/dy by their `pattern` at samples."""
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+        """F (samples, rows) and the entries (samples, entries) of dF/dy by their `pattern`, at samples."""
         evaluation = self._evaluate(z, u, p, True)
-        return AssembledJacobians(self._residuals(evaluation.x), self._jacobian_entries(evaluation))
+        return self._residuals(evaluation.x), self._jacobian_entries(evaluation)
 
     def _jacobian_entries(self, evaluation: _Evaluation) -> Array:
         if evaluation.jacobian_entries is None:
@@ -437,31 +379,7 @@ class AssembledEquations:
             evaluation.jacobian_entries = self._jacobian_plan.entries(evaluation.slopes)
         return evaluation.jacobian_entries
 
-    def derivatives(self, z: Array, u: Array, p: Array) -> list[Array | csr_matrix]:
-        """dF/dy (rows, y) at each sample: what is asked once of a structure, so that no plan of entries is made."""
-        slopes = self._evaluate(z, u, p, True).slopes
-        assert slopes is not None
-        return [self._derivatives_at(each) for each in slopes]
-
-    def _derivatives_at(self, slopes: Array) -> Array | csr_matrix:
-        y_count, states, rests = self._y_count, self._state_count, self._rest_count
-        if y_count <= MAX_DENSE_SIZE:
-            rates = self._rates(slopes[None], np.eye(y_count), None)[0]
-            return self._sums(self._all_residuals, rates, self._row_count).T
-        of_x = states, y_count + rests
-        inputs = range(self._coordinate_count, states)
-        start = _combinations((column, self._early_sums[column]) for column in (*self._start_columns, *inputs))
-        of_states = start.matrix(of_x)[:, :y_count]
-        nowhere = np.zeros(0, dtype=int)
-        of_rests = _sparse_matrix((rests, y_count), np.zeros(0), nowhere, nowhere)
-        for stage in self._stages:
-            of_rests = of_rests + stage.rest_rates.matrix((rests, states), slopes) @ of_states
-            sums = stage.coordinates.matrix(of_x)
-            of_states = of_states + sums[:, :y_count] + sums[:, y_count:] @ of_rests
-        sums = self._all_residuals.matrix((self._row_count, y_count + rests))
-        return sums[:, :y_count] + sums[:, y_count:] @ of_rests
-
-    def _rates(self, slopes: Array, y_rates: Array, bending: Array | None) -> tuple[Array, Array]:
+    def _rates(self, slopes: Array, y_rates: Array, bending: Array) -> tuple[Array, Array]:
         """The rates of x and of s for those of y (samples, y); `bending` (samples, rests) is what the rests' second
         rates owe to first ones."""
         samples, split = len(y_rates), len(self._unknowns)
@@ -472,10 +390,9 @@ class AssembledEquations:
         self._start_coordinates.set_in(state_rates, x_rates)
         rest_rates = x_rates[:, self._y_count :]
         for stage in self._stages:
-            stage.rest_rates.set_in(rest_rates, slopes, state_rates)
-            if bending is not None:
-                rows = stage.rest_rates.results
-                rest_rates[:, rows] += bending[:, rows]
+            stage.rest_rates.set_in(rest_rates, state_rates, slopes)
+            rows = stage.rest_rates.results
+            rest_rates[:, rows] += bending[:, rows]
             stage.coordinates.set_in(state_rates, x_rates)
         return x_rates, state_rates
 
@@ -489,8 +406,8 @@ class AssembledEquations:
         residuals, coordinates = [self._residuals(x)], [self._coordinates(x)]
         bending: Array = np.zeros((samples, self._rest_count))
         for order, rates in enumerate((y1, y2), 1):
-            x_rates, state_rates = self._rates(slopes, rates, bending if order == 2 else None)
-            residuals.append(self._sums(self._all_residuals, x_rates, self._row_count))
+            x_rates, state_rates = self._rates(slopes, rates, bending)
+            residuals.append(_all_values(self._all_residuals, x_rates, self._row_count))
             coordinates.append(self._coordinates(x_rates))
             if order == 1:
                 for stage in self._stages:
@@ -507,113 +424,93 @@ class AssembledEquations:
         return self._jacobian_plan.pattern
 
     @cached_property
-    def _rest_plan(self) -> _RestPlan:
-        """How the derivatives of rests by y are computed."""
-        state_entries: dict[int, dict[int, int]] = {}
+    def _jacobian_plan(self) -> _JacobianPlan:
+        """How the derivatives by y are computed."""
         constants: list[float] = []
-
-        def add_state(column: int, sums: Mapping[int, float]) -> dict[int, int]:
-            entries = {}
-            for source, value in sums.items():
-                entries[source] = len(constants)
-                constants.append(value)
-            state_entries[column] = entries
-            return entries
-
-        for column in (*self._start_columns, *range(self._coordinate_count, self._state_count)):
-            add_state(column, self._early_sums[column])
+        state_entries: dict[int, dict[int, int]] = {}
+        "by columns of s: of every entry of y the place of the derivative"
         rest_entries: dict[int, dict[int, int]] = {}
         rest_count = 0
-        steps: list[tuple[_Products, _Combinations]] = []
-        for number, stage in enumerate(self._stages):
-            terms: list[tuple[int, list[tuple[int, int]]]] = []
-            for row in stage.rest_rates.results:
-                entries: dict[int, int] = {}
+        steps: list[tuple[_Sums, _Sums]] = []
+
+        def add_entries(sums: Mapping[int, float]) -> tuple[dict[int, int], list[tuple[int, Iterable[_Term]]]]:
+            """The places of the derivatives of a sum over x, and what those of rests add to them."""
+            places: dict[int, int] = {}
+            parts: dict[int, dict[int, float]] = {}
+            for source, factor in sums.items():
+                by_rest = source >= self._y_count
+                for column, entry in rest_entries.get(source - self._y_count, {}).items() if by_rest else ():
+                    terms = parts.setdefault(column, {})
+                    terms[entry] = terms.get(entry, 0.0) + factor
+                if not by_rest:
+                    places[source] = len(constants)
+                    constants.append(factor)
+            for column in parts:
+                if column not in places:
+                    places[column] = len(constants)
+                    constants.append(0.0)
+            return places, [(places[column], terms.items()) for column, terms in parts.items()]
+
+        for column in (*self._start_columns, *range(self._coordinate_count, self._state_count)):
+            state_entries[column], _ = add_entries(self._early_sums[column])
+        for stage, columns in zip(self._stages, self._columns_after_stage, strict=True):
+            products: list[tuple[int, list[tuple[int, int]]]] = []
+            for row in stage.rest_rates.results.tolist():
                 pairs: dict[int, list[tuple[int, int]]] = {}
-                for slope, column in self._row_slopes[row]:
+                for column, slope in self._row_slopes[row]:
                     for source, place in state_entries[column].items():
-                        pairs.setdefault(source, []).append((slope, place))
-                for source, factors in pairs.items():
-                    entries[source] = rest_count
-                    terms.append((rest_count, factors))
-                    rest_count += 1
-                rest_entries[int(row)] = entries
-            sums: list[tuple[int, dict[int, float]]] = []
-            for column in self._columns_after_stage[number]:
-                constant, varying = self._expand(self._early_sums[column], rest_entries)
-                sources = {**constant, **varying}
-                places = add_state(column, {source: constant.get(source, 0.0) for source in sources})
-                sums += [(places[source], parts) for source, parts in varying.items()]
-            steps.append((_products(terms), _combinations(sums)))
-        return _RestPlan(np.array(constants), rest_count, steps, rest_entries)
-
-    def _expand(
-        self, sums: Mapping[int, float], rest_entries: Mapping[int, Mapping[int, int]]
-    ) -> tuple[dict[int, float], dict[int, dict[int, float]]]:
-        """The derivative of a sum over x by y: constants, and for every entry of y sums over entries of the rests'."""
-        constant = {source: value for source, value in sums.items() if source < self._y_count}
-        varying: dict[int, dict[int, float]] = {}
-        for source, value in sums.items():
-            if source >= self._y_count:
-                for column, entry in rest_entries.get(source - self._y_count, {}).items():
-                    parts = varying.setdefault(column, {})
-                    parts[entry] = parts.get(entry, 0.0) + value
-        return constant, varying
-
-    @cached_property
-    def _jacobian_plan(self) -> _JacobianPlan:
-        plan = self._rest_plan
-        entries: list[tuple[int, int, float, dict[int, float]]] = []
+                        pairs.setdefault(source, []).append((place, slope))
+                rest_entries[row] = {source: rest_count + k for k, source in enumerate(pairs)}
+                products += zip(rest_entries[row].values(), pairs.values(), strict=True)
+                rest_count += len(pairs)
+            changes = []
+            for column in columns:
+                state_entries[column], added = add_entries(self._early_sums[column])
+                changes += added
+            steps.append((_sums(products, int), _sums(changes)))
+        entries: list[tuple[int, int, int]] = []
+        changes_of: dict[int, Iterable[_Term]] = {}
         for row, sums in enumerate(self._residual_sums):
-            constant, varying = self._expand(sums, plan.rest_entries)
-            entries += [
-                (column, row, constant.get(column, 0.0), varying.get(column, {})) for column in {**constant, **varying}
-            ]
-        entries.sort(key=lambda entry: entry[:2])
-        columns = np.array([entry[0] for entry in entries], dtype=int)
-        first = np.searchsorted(columns, np.arange(self._y_count + 1))
-        pattern = SparsePattern(
-            (len(self._residual_sums), self._y_count), np.array([entry[1] for entry in entries], dtype=np.int32), first
-        )
-        return _JacobianPlan(
-            pattern, np.array([entry[2] for entry in entries]), _combinations(enumerate(e[3] for e in entries)), plan
-        )
+            places, added = add_entries(sums)
+            changes_of |= added
+            entries += [(column, row, place) for column, place in places.items()]
+        entries.sort()
+        steps.append((_sums((), int), _sums((place, changes_of.get(place, ())) for *_, place in entries)))
+        entry_columns, rows, order = np.array(entries, dtype=int).reshape(-1, 3).T
+        first = np.searchsorted(entry_columns, np.arange(self._y_count + 1))
+        pattern = SparsePattern((self._row_count, self._y_count), rows.astype(np.int32), first)
+        return _JacobianPlan(pattern, np.array(constants), rest_count, steps, order)
 
 
-class _RestPlan(NamedTuple):
-    """The derivatives of rests by y: entries of those of s begin as constants, then stage after stage products of
-    slopes and entries of s give entries of the rests, and these change entries of s."""
+_Term = tuple[int, float]
+"""A source and a factor."""
 
-    state_constants: Array
-    rest_count: int
-    steps: list[tuple[_Products, _Combinations]]
-    rest_entries: dict[int, dict[int, int]]
-    "for every row its entries by y"
 
-    def entries(self, slopes: Array) -> Array:
-        """Entries (samples, entries) of the derivatives of all rests."""
-        rests: Array = np.zeros((len(slopes), self.rest_count), slopes.dtype)
-        state = np.repeat(self.state_constants[None].astype(slopes.dtype), len(slopes), axis=0)
-        for products, sums in self.steps:
-            products.set_in(rests, slopes, state)
-            if len(sums.results):
-                constant = state[:, sums.results].copy()
-                sums.set_in(state, rests)
-                state[:, sums.results] += constant
-        return rests
+def _all_values(sums: _Sums, x: Array, count: int) -> Array:
+    """The results (samples, count) of sums of x (samples, x), nothing where there is no sum."""
+    values: Array = np.zeros((len(x), count), x.dtype)
+    sums.set_in(values, x)
+    return values
 
 
 class _JacobianPlan(NamedTuple):
-    """Entries of a Jacobian, column after column: constants, and sums over entries of the rests' derivatives."""
+    """Derivatives by y: entries of those of s, and of F behind them, begin as constants, then stage after stage
+    products of slopes and entries of s give entries of the rests, and these change entries of s, at last those of F."""
 
     pattern: SparsePattern
+    "where the entries of dF/dy stand"
     constants: Array
-    sums: _Combinations
-    rest_plan: _RestPlan
+    rest_count: int
+    steps: list[tuple[_Sums, _Sums]]
+    order: IntArray
+    "the entries of dF/dy, column after column"
 
     def entries(self, slopes: Array) -> Array:
-        """The entries (samples, entries)."""
-        rests = self.rest_plan.entries(slopes)
-        entries: Array = np.zeros((len(slopes), len(self.constants)), slopes.dtype)
-        self.sums.set_in(entries, rests)
-        return entries + self.constants
+        """The entries (samples, entries) of dF/dy."""
+        rests: Array = np.zeros((len(slopes), self.rest_count), slopes.dtype)
+        state = np.repeat(self.constants[None].astype(slopes.dtype), len(slopes), axis=0)
+        for products, changes in self.steps:
+            products.set_in(rests, state, slopes)
+            if len(changes.results):
+                state[:, changes.results] += changes.values(rests)
+        return state[:, self.order]

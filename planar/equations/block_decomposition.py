@@ -33,13 +33,13 @@ def decompose_blocks(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Bl
     surplus = [row for row in range(len(rows)) if row not in matched]
     free = _underdetermined_columns(loose, rows, row_of)
     groups = [
-        BlockIndices(tuple(sorted(held)), tuple(sorted(block)))
-        for held, block in _overdetermined_parts(surplus, rows, row_of)
+        BlockIndices(tuple(sorted(block_rows)), tuple(sorted(block)))
+        for block_rows, block in _overdetermined_parts(surplus, rows, row_of)
     ]
     taken = {column for group in groups for column in group.columns}
     for block in _strong_components(rows, {column: row for column, row in row_of.items() if column not in taken}):
-        held = tuple(sorted(row_of[column] for column in block))
-        groups.append(BlockIndices(held, tuple(block), not free.isdisjoint(block)))
+        block_rows = tuple(sorted(row_of[column] for column in block))
+        groups.append(BlockIndices(block_rows, tuple(block), not free.isdisjoint(block)))
     if loose:
         groups.append(BlockIndices((), loose, is_free=True))
     return tuple(groups)
@@ -54,18 +54,18 @@ def _overdetermined_parts(
     """
     parts: list[tuple[set[int], set[int]]] = []
     for row in surplus:
-        held, waiting = {row}, [row]
+        part_rows, waiting = {row}, [row]
         reached: set[int] = set()
         while waiting:
             for column in rows[waiting.pop()] - reached:
                 reached.add(column)
-                held.add(row_of[column])
+                part_rows.add(row_of[column])
                 waiting.append(row_of[column])
         for other in [part for part in parts if not part[1].isdisjoint(reached)]:
             parts.remove(other)
-            held |= other[0]
+            part_rows |= other[0]
             reached |= other[1]
-        parts.append((held, reached))
+        parts.append((part_rows, reached))
     return parts
 
 
@@ -142,8 +142,8 @@ def _underdetermined_columns(
         return set()
     touching: dict[int, list[int]] = {}
     column_of = {row: column for column, row in row_of.items()}
-    for row, held in enumerate(rows):
-        for column in held:
+    for row, columns in enumerate(rows):
+        for column in columns:
             touching.setdefault(column, []).append(row)
     free, waiting = set(unmatched_columns), list(unmatched_columns)
     while waiting:

@@ -9,18 +9,17 @@ from __future__ import annotations
 import json
 from functools import cached_property, lru_cache
 from math import inf, isfinite, remainder
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
-from planar.equations.closed_form_assemblies import SETTLED_STEP, ClosedFormAssemblies
-from planar.equations.known_types import known_text
-from planar.equations.linear import solve_vectors
+from planar.equations.elements import known_text
+from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies, polish
 from planar.equations.structure_formulas import StructureFormulas
 from planar.foundation.angles import wrap_angle
-from planar.foundation.arrays import Array, greatest_size
+from planar.foundation.arrays import Array
 from planar.foundation.jets import TURN
 from planar.foundation.recorded_formula import (
     RecordedFormula,
@@ -30,19 +29,15 @@ from planar.foundation.recorded_formula import (
 )
 from planar.model.pairs import MeasureKind
 
+if TYPE_CHECKING:
+    from planar.equations.block_motion import LargeBlockMotion
+
 MAX_RUN_STEPS = 6
 """Steps of Newton's method at a position of a run."""
 
 
 MAX_FORMULA_UNKNOWNS = 12
 """Unknowns of a block: the formula of the motion of a larger one would be too long."""
-
-
-class BlockMotionFunction(Protocol):
-    """The motion of a block type."""
-
-    def evaluate_entries(self, count: int, *arguments: Array) -> Array:
-        """See `FormulaFunction.evaluate_entries`."""
 
 
 class BlockTypeFormulas(NamedTuple):
@@ -76,12 +71,10 @@ def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
 
     equations = block_equations(key)
     formulas = StructureFormulas(equations)
-    form = closed_form_formula(equations, equations.blocks[0])
     return BlockTypeFormulas(
         formulas.block_function(equations.blocks[0]).formula,
         formulas.coordinate_function.formula,
-        form and form.formula,
-        form is not None and form.has_changing_arm,
+        *closed_form_formula(equations, equations.blocks[0]),
     )
 
 
@@ -112,15 +105,19 @@ class BlockTypeFunctions:
         return FormulaFunction(self._formulas.coordinates, self._counts, ((1, len(self._key.own_kinds)),))
 
     @cached_property
-    def motion(self) -> BlockMotionFunction:
+    def motion(self) -> FormulaFunction | LargeBlockMotion:
         """(unknowns, known coordinates with first and second rates, numbers, row scale, column floor): see
         `block_motion`."""
         unknowns, known, numbers = self._counts
-        if unknowns > MAX_FORMULA_UNKNOWNS:
-            from planar.equations.large_block_motion import LargeBlockMotion  # few blocks are so large
+        text = known_text(motion_fingerprint(self._key))
+        if text is not None:
+            formula = RecordedFormula.from_text(text)
+        else:
+            from planar.equations.block_motion import LargeBlockMotion, derive_block_motion  # most types are known
 
-            return LargeBlockMotion(block_equations(self._key))
-        formula = block_motion_formula(self._key)
+            if unknowns > MAX_FORMULA_UNKNOWNS:
+                return LargeBlockMotion(block_equations(self._key))
+            formula = derive_block_motion(block_equations(self._key))
         counts = unknowns, known, known, known, numbers, len(self._key.row_kinds), unknowns
         return FormulaFunction(formula, counts, ((1, len(formula.results)),))
 
@@ -133,25 +130,25 @@ class BlockTypeFunctions:
         form = FormulaFunction(formula, (*self._counts, 1), ((1, count), (1, 1)))
         return ClosedFormAssemblies(slice(0, count), form, self.closing, self._formulas.has_changing_arm)
 
-    def run(self, z: Array, known: Array, numbers: Array, at: int = 0) -> Array:
+    def run(self, z: Array, known: Array, numbers: Array, index: int = 0) -> Array:
         """The unknowns (samples, unknowns) where known coordinates are `known` (samples, known); z is next to those of
         the sample `at`."""
         run = self._run_newton if self.assemblies is None else self._run_form
-        return run(z, known, numbers, at)
+        return run(z, known, numbers, index)
 
-    def _run_form(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
+    def _run_form(self, z: Array, known: Array, numbers: Array, index: int) -> Array:
         """The assembly in closed form that is the nearer to z at that sample."""
         assert self.assemblies is not None
         is_angle = self.is_angle
-        sign = np.array([self.nearest_sign(z, known[at], numbers)])
+        sign = np.array([self.nearest_sign(z, known[index], numbers)])
         starts = np.repeat(z[None], len(known), axis=0)
         assemblies, steps = self.polished_form.evaluate_batch(len(known), starts, known, numbers, sign)
         samples: Array = assemblies[:, 0]
         angles = samples[:, is_angle]
         turned = np.cumsum(wrap_angle(np.diff(angles, axis=0, prepend=angles[:1])), axis=0)
-        samples[:, is_angle] = z[is_angle] + wrap_angle(angles[at] - z[is_angle]) + (turned - turned[at])
+        samples[:, is_angle] = z[is_angle] + wrap_angle(angles[index] - z[is_angle]) + (turned - turned[index])
         if (np.abs(steps) > SETTLED_STEP).any():
-            self.assemblies.polish(samples, known, numbers)
+            polish(self.closing, samples, known, numbers)
         return samples
 
     def nearest_sign(self, z: Array, known: Array, numbers: Array) -> float:
@@ -159,9 +156,8 @@ class BlockTypeFunctions:
         place = z.tolist(), known.tolist(), numbers.tolist()
 
         def distance(sign: float) -> float:
-            moves = [
-                there - here for there, here in zip(self.polished_form.values(*place, [sign]), place[0], strict=False)
-            ]
+            values = self.polished_form.values(*place, [sign])
+            moves = [value - unknown for value, unknown in zip(values, place[0], strict=False)]
             if not all(map(isfinite, moves)):
                 return inf
             sizes = (remainder(move, TURN) if turns else move for move, turns in zip(moves, self.is_angle, strict=True))
@@ -185,41 +181,24 @@ class BlockTypeFunctions:
         formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
         return FormulaFunction(formula, counts, ((1, len(z)), (1, len(z))))
 
-    def _run_newton(self, z: Array, known: Array, numbers: Array, at: int) -> Array:
+    def _run_newton(self, z: Array, known: Array, numbers: Array, index: int) -> Array:
         """By Newton's method from where the samples before lead."""
         samples: Array = np.empty((len(known), len(z)))
 
-        def corrected(z: Array, coordinates: Array) -> Array:
-            for _ in range(MAX_RUN_STEPS):
-                residuals, columns = self.closing(z, coordinates, numbers)
-                move = solve_vectors(columns.T[None], residuals)[0]
-                z = z - move
-                if not greatest_size(move) > SETTLED_STEP:
-                    break
-            return z
-
-        samples[at] = corrected(z, known[at])
-        for rows in (range(at + 1, len(known)), range(at - 1, -1, -1)):
-            here, step = samples[at], np.zeros(len(z))
+        samples[index] = z
+        polish(self.closing, samples[index : index + 1], known[index], numbers, steps=MAX_RUN_STEPS)
+        for rows in (range(index + 1, len(known)), range(index - 1, -1, -1)):
+            previous, step = samples[index], np.zeros(len(z))
             for k in rows:
-                samples[k] = corrected(here + step, known[k])
-                here, step = samples[k], samples[k] - here
+                samples[k] = previous + step
+                polish(self.closing, samples[k : k + 1], known[k], numbers, steps=MAX_RUN_STEPS)
+                previous, step = samples[k], samples[k] - previous
         return samples
 
 
 def motion_fingerprint(key: BlockTypeKey) -> str:
     """What tells the motion of a type from all other formulas."""
     return f"{key.fingerprint} motion"
-
-
-def block_motion_formula(key: BlockTypeKey) -> RecordedFormula:
-    """The motion of a block type, known or derived."""
-    text = known_text(motion_fingerprint(key))
-    if text is not None:
-        return RecordedFormula.from_text(text)
-    from planar.equations.block_motion import derive_block_motion  # most types are known
-
-    return derive_block_motion(block_equations(key))
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)

@@ -6,7 +6,7 @@ own equations need: its unknowns, the coordinates of earlier blocks and inputs n
 
 from __future__ import annotations
 
-from collections.abc import Container, Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,9 +14,8 @@ import numpy as np
 
 from planar.equations.assembled_equations import Elimination
 from planar.equations.coordinates import Coordinate
-from planar.equations.elements import Element, PlacedElement
+from planar.equations.elements import Element, PlacedElement, fingerprint
 from planar.equations.elimination import EliminationRow
-from planar.equations.known_types import fingerprint
 from planar.equations.residuals import ConstraintRow
 from planar.equations.symbolic_equations import Block, ConstraintEquations, expressions_of_elimination
 from planar.foundation.arrays import IntArray
@@ -105,12 +104,12 @@ class _BlockPlacer:
         e, elimination = self._equations, self._elimination
         unknowns = list(e.unknowns[block.unknowns])
         solved = sorted((column for column in columns if column in self._order), key=self._order.__getitem__)
-        own = [*unknowns, *solved]
-        if set(own) != set(columns) or block.is_free:
+        columns_inside = [*unknowns, *solved]
+        if set(columns_inside) != set(columns) or block.is_free:
             return None
         residual_lines = [elimination.lines[row] for row in e.row_indices[block.rows]]
         solved_lines = [self._line_of[column] for column in solved]
-        local = _LocalIndices(own)
+        local = _LocalIndices(columns_inside)
         elements = self._place_elements((*solved_lines, *residual_lines), local, block.block_index)
         if elements is None:
             return None
@@ -126,17 +125,19 @@ class _BlockPlacer:
         residual_terms = tuple(terms(line) for line in residual_lines)
         if any(self._is_behind(column, block.block_index) for column in local.known):
             return None
+        kinds = [*(coordinate.kind for coordinate in e.coordinates), *e.input_kinds]
         key = BlockTypeKey(
             elements,
             solved_terms,
             residual_terms,
             tuple(row.kind for row in e.rows[block.rows]),
-            tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in own),
+            tuple((e.coordinates[column].kind, e.coordinates[column].of_link) for column in columns_inside),
             len(unknowns),
-            tuple(self._kind_of(column) for column in local.known),
+            tuple(kinds[column] for column in local.known),
             len(local.numbers),
         )
-        return PlacedBlock(key, *(np.array(indices, dtype=int) for indices in (local.known, local.numbers, own)))
+        indices = local.known, local.numbers, columns_inside
+        return PlacedBlock(key, *(np.array(part, dtype=int) for part in indices))
 
     def _place_elements(
         self, lines: Sequence[EliminationRow], local: _LocalIndices, level: int
@@ -145,22 +146,23 @@ class _BlockPlacer:
         needed_rows = {row for line in lines for row in line.multipliers}
         first_input = len(self._equations.coordinates)
         elements = []
-        for placed in self._elements_of(lines):
+        of_rows = (self._element_of_row[row] for line in lines for row in line.multipliers)
+        for placed in {placed.rows.start: placed for placed in of_rows}.values():
             taken = placed.element.arguments.numbers
             number_of = {k: len(local.numbers) + place for place, k in enumerate(taken)}
             local.numbers += [placed.numbers[k] for k in taken]
             for row in placed.rows:
                 local.rows[row] = len(local.rows)
-            used = _used_coordinates(placed.element)
+            used: set[int] = set().union(*placed.element.nonlinear, placed.element.arguments.coordinates)
             # of rows that are not needed here it does not matter what is put in
             stand_ins = {
                 k
                 for k in used
                 if placed.coordinates[k] not in local.places and self._is_behind(placed.coordinates[k], level)
             }
-            if stand_ins and not (
-                self._equations.input_kinds and stand_ins.isdisjoint(_coordinates_of_rows(placed, needed_rows))
-            ):
+            by_row = zip(placed.rows, placed.element.nonlinear, strict=True)
+            needed: set[int] = set().union(*(columns for row, columns in by_row if row in needed_rows))
+            if stand_ins and not (self._equations.input_kinds and stand_ins.isdisjoint(needed)):
                 return None
             coordinates = tuple(
                 local.of_column(first_input if k in stand_ins else column) if k in used else -1
@@ -175,27 +177,12 @@ class _BlockPlacer:
         """Whether a coordinate is not known ahead of a block of this level."""
         return column < len(self._equations.coordinates) and self._equations.known_after_block[column] >= level
 
-    def _elements_of(self, lines: Sequence[EliminationRow]) -> Iterable[PlacedElement]:
-        """The elements whose rests stand in lines, each once."""
-        placed = (self._element_of_row[row] for line in lines for row in line.multipliers)
-        return {element.rows.start: element for element in placed}.values()
-
-    def _kind_of(self, column: int) -> MeasureKind:
-        e = self._equations
-        count = len(e.coordinates)
-        return e.coordinates[column].kind if column < count else e.input_kinds[column - count]
-
-
-def _used_coordinates(element: Element) -> set[int]:
-    """The local coordinates that the rest of an element depends on."""
-    return set().union(*element.nonlinear, element.arguments.coordinates)
-
 
 class _LocalIndices:
     """Indices of a block's own: coordinates, its own ones first, then those that it takes as known; rows, numbers."""
 
-    def __init__(self, own: Sequence[int]):
-        self.places = {column: k for k, column in enumerate(own)}
+    def __init__(self, columns_inside: Sequence[int]):
+        self.places = {column: k for k, column in enumerate(columns_inside)}
         self.known: list[int] = []
         self.rows: dict[int, int] = {}
         self.numbers: list[int] = []
@@ -206,12 +193,6 @@ class _LocalIndices:
             self.places[column] = len(self.places)
             self.known.append(column)
         return self.places[column]
-
-
-def _coordinates_of_rows(placed: PlacedElement, rows: Container[int]) -> set[int]:
-    """The local coordinates on which the rests of some rows depend."""
-    needed = (columns for row, columns in zip(placed.rows, placed.element.nonlinear, strict=True) if row in rows)
-    return set().union(*needed)
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)

@@ -20,8 +20,8 @@ import numpy as np
 
 from planar.equations.casadi_call import formula_text
 from planar.equations.elimination import stack_expressions
-from planar.equations.generic_evaluation import recorded_function
-from planar.equations.symbolic_equations import Block, ConstraintEquations, is_piecewise_in
+from planar.equations.generic_evaluation import is_piecewise_in, recorded_function
+from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.recorded_formula import RecordedFormula
@@ -36,8 +36,8 @@ SAMPLE_POINTS = 3
 class ClosedForm(NamedTuple):
     """One block in closed form, as expressions in the symbols of its equations and in `sign`.
 
-    `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
-    or -1, which of the two assemblies; `side`: an expression in all unknowns that has this sign; `bend`: 0 to 1, where
+    `values`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
+    or -1, which of the two assemblies; `sign_expression`: in all unknowns, has this sign; `coalescence`: 0 to 1, where
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
     `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None.
     `squared_lengths` (2,): of the Jacobian's columns.
@@ -49,16 +49,6 @@ class ClosedForm(NamedTuple):
     coalescence: ca.SX
     squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
-
-
-class ClosedFormFormula(NamedTuple):
-    """The formula (z, u, p, sign) of a block's unknowns in closed form, then of where its assemblies meet.
-
-    `has_changing_arm`: whether a length turns on an arm that changes as the mechanism moves.
-    """
-
-    formula: RecordedFormula
-    has_changing_arm: bool
 
 
 class _ComplexNumber(NamedTuple):
@@ -96,54 +86,46 @@ class _ComplexNumber(NamedTuple):
         return _ComplexNumber(self.x, -self.y)
 
 
-class _DerivedForm(NamedTuple):
-    """The closed form of a formula of two rows: a function (unknowns, other symbols, sign) -> the parts of the values
-    one after the other, and what else a `ClosedForm` holds; how many parts each value has, and whether there is an arm.
-    """
-
-    function: ca.Function
-    part_counts: tuple[int, ...]
-    has_arm: bool
-
-    def form_of(self, unknowns: ca.SX, others: ca.SX) -> ClosedForm:
-        """The form of these unknowns where these symbols stand in its rows."""
-        sign = ca.SX.sym("sign")
-        *found, lengths, arm = self.function(unknowns, others, sign)
-        parts = iter(found)
-        values = tuple(tuple(next(parts) for _ in range(count)) for count in self.part_counts)
-        side, coalescence = parts
-        return ClosedForm(values, sign, side, coalescence, lengths, arm if self.has_arm else None)
-
-
 def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     """The closed form of a block; None where it has none of the three forms."""
-    if stage.is_free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
+    if stage.is_free or not slice_length(stage.rows) == slice_length(stage.unknowns) == 2:
         return None
     angles = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns])
-    if not any(angles) or any(
-        e.rows[row].kind is MeasureKind.ANGLE for row in range(stage.rows.start, stage.rows.stop)
-    ):
+    if not any(angles) or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None
     rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
-    others = ca.vertcat(ca.SX(0, 1), *(each for each in ca.symvar(rows) if not ca.depends_on(unknowns, each)))
+    others = ca.vertcat(ca.SX(0, 1), *(symbol for symbol in ca.symvar(rows) if not ca.depends_on(unknowns, symbol)))
     derived = _derive_form(formula_text(rows, unknowns, others), angles)
-    return derived and derived.form_of(unknowns, others)
+    if derived is None:
+        return None
+    function, part_counts, has_arm = derived
+    sign = ca.SX.sym("sign")
+    *results, lengths, arm = function(unknowns, others, sign)
+    parts = iter(results)
+    values = tuple(tuple(next(parts) for _ in range(count)) for count in part_counts)
+    side, coalescence = parts
+    return ClosedForm(values, sign, side, coalescence, lengths, arm if has_arm else None)
 
 
-def closed_form_formula(e: ConstraintEquations, block: Block) -> ClosedFormFormula | None:
-    """The closed form of a block as a formula; None where it has none."""
+def closed_form_formula(e: ConstraintEquations, block: Block) -> tuple[RecordedFormula | None, bool]:
+    """The formula (z, u, p, sign) of a block's unknowns in closed form, then of where its assemblies meet, None where
+    it has none; and whether a length turns on an arm that changes as the mechanism moves."""
     form = find_closed_form(e, block)
     if form is None:
-        return None
-    values = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
+        return None, False
+    values = stack_expressions(ca.atan2(*parts[::-1]) if len(parts) == 2 else parts[0] for parts in form.values)
     function = ca.Function("form", [e.z, e.u, e.p, form.sign], [ca.densify(values), form.coalescence])
-    return ClosedFormFormula(recorded_function(function), form.squared_arm is not None)
+    return recorded_function(function), form.squared_arm is not None
 
 
 @lru_cache(maxsize=1024)
-def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
+def _derive_form(formula: str, angles: tuple[bool, ...]) -> tuple[ca.Function, tuple[int, ...], bool] | None:
     """The closed form of rows that are a function, as casadi writes it, of two unknowns, some of them angles, and of
-    other symbols: once for all blocks of that formula."""
+    other symbols: once for all blocks of that formula.
+
+    A function (unknowns, other symbols, sign) -> the parts of the values one after the other, and what else a
+    `ClosedForm` holds; how many parts each value has, and whether there is an arm.
+    """
     function = ca.Function.deserialize(formula)
     both, others = (ca.SX.sym(name, function.numel_in(k)) for k, name in enumerate(("unknowns", "others")))
     rows = function(both, others)
@@ -155,12 +137,11 @@ def _derive_form(formula: str, angles: tuple[bool, ...]) -> _DerivedForm | None:
         return None
     values = form.values[::-1] if first else form.values
     arm = ca.SX(0.0) if form.squared_arm is None else form.squared_arm
-    found = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
-    wanted = [ca.densify(each) for each in (*found, form.squared_lengths, arm)]
+    results = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
+    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm)]
     part_counts = tuple(len(value) for value in values)
-    return _DerivedForm(
-        ca.Function("form", [both, others, form.sign], wanted), part_counts, form.squared_arm is not None
-    )
+    derived = ca.Function("form", [both, others, form.sign], outputs)
+    return derived, part_counts, form.squared_arm is not None
 
 
 def _solve_two_angles(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
@@ -205,25 +186,25 @@ def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | 
     if signs is None:
         return None
     parts = fixed_slide, turned_slide[0], turned[0]
-    rest = _which_vanish(list(parts))
+    is_zero = [bool(np.all(np.abs(values) < ZERO_TOLERANCE)) for values in _evaluate_at_random(list(parts))]
     fixed, d, a, g = (_rows_as_complex(part, signs) for part in (*parts, fixed_rows))
     sign = ca.SX.sym("sign")
-    if rest[1] and not rest[0] and not rest[2]:
+    if is_zero[1] and not is_zero[0] and not is_zero[2]:
         # the length goes along a direction that is known
-        way, base, reach = fixed, g, a
-    elif rest[0] and not rest[1]:
-        way, base, reach = d, a, g
+        direction, base, reach = fixed, g, a
+    elif is_zero[0] and not is_zero[1]:
+        direction, base, reach = d, a, g
     else:
         return None
-    gap, spanned = base.cross(way), reach.squared_length * way.squared_length
-    length = (sign * ca.sqrt(spanned - gap * gap) - base.dot(way)) / way.squared_length
-    side = way.squared_length * slide + base.dot(way)
-    if way is fixed:
-        unit = (-(g + way.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
+    gap, spanned = base.cross(direction), reach.squared_length * direction.squared_length
+    length = (sign * ca.sqrt(spanned - gap * gap) - base.dot(direction)) / direction.squared_length
+    side = direction.squared_length * slide + base.dot(direction)
+    if direction is fixed:
+        unit = (-(g + direction.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
-    squared_arm = None if way is fixed else g.squared_length
-    lengths = ca.vertcat(reach.squared_length, way.squared_length)
+    squared_arm = None if direction is fixed else g.squared_length
+    lengths = ca.vertcat(reach.squared_length, direction.squared_length)
     return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, squared_arm)
 
 
@@ -253,26 +234,21 @@ def _rotation_senses(gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int]
     Left: the factors of the sine are those of the cosine, turned to the left by a right angle. All have to turn alike,
     and the form has to agree with the equations.
     """
-    found, values = [], [_evaluate_at_random([gap, *each]) for each in turned]
-    for left, cosine, sine in values:
-        if not np.all(np.abs(left) < ZERO_TOLERANCE):
+    signs, values = [], [_evaluate_at_random([gap, *factors]) for factors in turned]
+    for difference, cosine, sine in values:
+        if not np.all(np.abs(difference) < ZERO_TOLERANCE):
             return None
-        ways = [
-            way for way in (1, -1) if np.all(np.abs(sine - way * np.stack([-cosine[1], cosine[0]])) < ZERO_TOLERANCE)
-        ]
-        if not ways:
+        rotated = np.stack([-cosine[1], cosine[0]])
+        senses = [sense for sense in (1, -1) if np.all(np.abs(sine - sense * rotated) < ZERO_TOLERANCE)]
+        if not senses:
             return None
-        found.append(0 if len(ways) == 2 else ways[0])
-    return found if len(set(found) - {0}) == 1 else None
-
-
-def _which_vanish(parts: list[ca.SX]) -> list[bool]:
-    return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(parts)]
+        signs.append(0 if len(senses) == 2 else senses[0])
+    return signs if len(set(signs) - {0}) == 1 else None
 
 
 def _evaluate_at_random(parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(ca.vertcat(*parts)))
     function = ca.Function("parts", [symbols], [ca.densify(part) for part in parts])
-    found = function(generic_numbers(symbols.numel(), SAMPLE_POINTS))
-    return [each.full() for each in (found if isinstance(found, tuple) else (found,))]
+    values = function(generic_numbers(symbols.numel(), SAMPLE_POINTS))
+    return [value.full() for value in (values if isinstance(values, tuple) else (values,))]

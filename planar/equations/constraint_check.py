@@ -6,7 +6,8 @@ terms; pairs of equal formula are computed at once, on arrays with a row for eac
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import pi
 from typing import NamedTuple
@@ -14,13 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
-from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges
-from planar.equations.pair_formulas import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
+from planar.equations.coordinates import consecutive_ranges
+from planar.equations.elements import PARTS_OF_FRAME, pair_formula, recorded_pair_formula
 from planar.equations.residuals import CARRIED_ROUNDING, closing_error
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.geometry import GROUND, Frame, frame_term_sizes
 from planar.foundation.jets import Jet, Scalar, TermSizes, cos, sin, term_sizes, value_and_rates
-from planar.foundation.recorded_formula import RecordedNumber, elementwise, greatest_entries, record_formula
+from planar.foundation.recorded_formula import (
+    RecordedFormula,
+    RecordedNumber,
+    elementwise,
+    greatest_entries,
+    record_formula,
+)
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
@@ -31,17 +38,7 @@ RESULTS_OF_ROW = ORDERS + 2
 MAX_RECORDED_CHECKS = 1024
 MAX_STACKED_NUMBERS = 2**14
 """Numbers (pairs times samples) of an array that is computed with: larger ones are computed in parts."""
-MAX_CACHED_GROUPINGS = 64
-
-
-class ConstraintJudgement(NamedTuple):
-    """What is judged at samples (samples,): see `AcceptanceResult`."""
-
-    residual: Array
-    finite_sum: Array
-    velocity_error: Array
-    acceleration_error: Array
-    contact_gap: Array
+MAX_CACHED_CHECKS = 64
 
 
 class ConstraintRows(NamedTuple):
@@ -58,53 +55,52 @@ class ConstraintRows(NamedTuple):
     frames: Array
 
 
-class _PairGroup(NamedTuple):
-    """Pairs whose residuals, or positions as inputs, are computed together by the formula of one of them."""
+class _GroupKey(NamedTuple):
+    """What is equal of pairs that are computed together."""
 
-    key: Hashable
-    "equal where the formula is"
-    pair: Pair
+    formula: RecordedFormula
     is_input: bool
     is_moving: tuple[bool, ...]
     "whether a body moves"
+    counts: tuple[int, int]
+    "of own coordinates and numbers"
+
+
+@dataclass(eq=False)
+class _PairGroup:
+    """Pairs whose residuals, or positions as inputs, are computed together by the formula of one of them.
+
+    Indices (entries, pairs): `bodies` of links, `rows` of constraints, `own` of (w, u) and `inputs` (pairs,) of it as
+    well, `numbers` of p.
+    """
+
+    key: _GroupKey
+    pair: Pair
     names: tuple[str, ...]
     bodies: IntArray
-    "(moving bodies, pairs): indices of links"
-    own: IntArray
-    "(own coordinates, pairs)"
     rows: IntArray
-    "(constraints, pairs)"
-
-    def record(self, orders: int) -> FormulaFunction:
-        """The formula for values alone (1), or with both rates and the sizes of their terms (3), recorded once."""
-        key = self.key, type(self.pair), orders
-        check = _RECORDED_CHECKS.get(key)
-        if check is None:
-            if len(_RECORDED_CHECKS) >= MAX_RECORDED_CHECKS:
-                _RECORDED_CHECKS.clear()
-            check = _RECORDED_CHECKS[key] = _record_check(self, orders)
-        return check
-
-
-_RECORDED_CHECKS: dict[Hashable, FormulaFunction] = {}
-
-
-class _PlacedGroup:
-    """Pairs of equal formula: of (w, u) the `own` coordinates (own, pairs), `inputs` (pairs,), of p the `numbers`."""
-
-    def __init__(self, group: _PairGroup, own: IntArray, numbers: IntArray, inputs: IntArray):
-        self.group, self.own, self.numbers, self.inputs = group, own, numbers, inputs
-        self.bodies, self.rows = group.bodies, group.rows
+    own_columns: IntArray
+    inputs: IntArray
+    numbers: IntArray
 
     @cached_property
     def check(self) -> FormulaFunction:
-        """With rates."""
-        return self.group.record(ORDERS)
+        """The formula with both rates and the sizes of their terms."""
+        return self._recorded(ORDERS)
 
     @cached_property
     def value_check(self) -> FormulaFunction:
-        """Of values alone."""
-        return self.group.record(1)
+        """The formula of values alone."""
+        return self._recorded(1)
+
+    def _recorded(self, orders: int) -> FormulaFunction:
+        """The formula, recorded once for all groups of equal ones."""
+        key = self.key, type(self.pair), orders
+        if key not in _RECORDED_CHECKS:
+            if len(_RECORDED_CHECKS) >= MAX_RECORDED_CHECKS:
+                _RECORDED_CHECKS.clear()
+            _RECORDED_CHECKS[key] = _record_check(self, orders)
+        return _RECORDED_CHECKS[key]
 
     def parts(self, samples: int) -> Iterator[slice]:
         """The pairs in parts, so that arrays stay small."""
@@ -123,7 +119,7 @@ class _PlacedGroup:
             return values.reshape(-1, positions)
 
         arguments = [entries(frames[:, :, body[part]]) for body in self.bodies]
-        arguments += [entries(motion[:, self.own[:, part]]), entries(motion[:, self.inputs[part]])]
+        arguments += [entries(motion[:, self.own_columns[:, part]]), entries(motion[:, self.inputs[part]])]
         numbers = p[self.numbers[:, part]]
         arguments.append(entries(numbers if p.ndim > 1 else np.repeat(numbers[..., None], samples, axis=-1)))
         check = self.value_check if orders == 1 else self.check
@@ -133,37 +129,56 @@ class _PlacedGroup:
         return results[:split].reshape(count, len(self.rows), *shape), results[split:].reshape(-1, orders, *shape)
 
 
-class ConstraintCheck:
-    """The constraints of one structure, of coordinates w and inputs u with their rates.
+_RECORDED_CHECKS: dict[Hashable, FormulaFunction] = {}
 
-    `column` says where in w the parts of links and the pairs' own coordinates stand; the inputs come after them.
+
+class ConstraintCheck:
+    """The constraints of pairs, then of inputs, between these moving links, of coordinates w and inputs u with rates.
+
+    In w the parts of all links come first, then the pairs' own coordinates; behind all coordinates stand the inputs.
     """
 
-    def __init__(self, mechanism: Mechanism, column: Mapping[tuple[str, str], int]):
-        motions = relative_motions(mechanism)
-        inputs = tuple(motions[given.pair] for given in mechanism.inputs)
-        links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
-        self._frame_columns = np.array([[column[link, part] for link in links] for part in FRAME_PARTS], dtype=int)
-        self._frame_columns = self._frame_columns.reshape(len(FRAME_PARTS), -1)
-        own_columns = [column[pair.name, part] for pair in mechanism.pairs for part, _ in pair.coordinate_kinds]
-        self._own = np.array(own_columns, dtype=int)
-        numbers = consecutive_ranges({pair.name: len(pair.number_kinds) for pair in mechanism.pairs})
-        kinds = [kind for pair in mechanism.pairs for kind in pair.residual_kinds]
-        pair_row_count = len(kinds)
-        kinds += [pair.input_kind for pair in inputs]
+    def __init__(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str], coordinate_count: int):
+        kinds = [kind for pair in pairs for kind in pair.residual_kinds] + [pair.input_kind for pair in inputs]
         self._lengths = np.flatnonzero([kind is MeasureKind.LENGTH for kind in kinds])
         self._angles = np.flatnonzero([kind is MeasureKind.ANGLE for kind in kinds])
-        self._row_count, self._coordinate_count = len(kinds), len(column)
-        self._groups = [
-            _PlacedGroup(
-                group,
-                self._own[group.own],
-                # the relative motion of an input that no pair stands for has no numbers, nor does its formula need any
-                _index_columns([numbers.get(name, [0] * len(group.pair.number_kinds)) for name in group.names]),
-                len(column) + group.rows[0] - pair_row_count if group.is_input else np.zeros(0, dtype=int),
+        self._row_count, self._link_count = len(kinds), len(moving)
+        self._coordinate_count = coordinate_count
+        own_count = sum(len(pair.coordinate_kinds) for pair in pairs)
+        self._own = slice(3 * len(moving), 3 * len(moving) + own_count)
+        self.groups = self._make_groups(pairs, inputs, moving)
+
+    def _make_groups(self, pairs: Sequence[Pair], inputs: Sequence[Pair], moving: Sequence[str]) -> list[_PairGroup]:
+        links = {link: k for k, link in enumerate(moving)}
+        own_columns = consecutive_ranges({pair.name: len(pair.coordinate_kinds) for pair in pairs}, 3 * len(moving))
+        numbers = consecutive_ranges({pair.name: len(pair.number_kinds) for pair in pairs})
+        members: dict[_GroupKey, list[tuple[Pair, range, int]]] = {}
+        row = 0
+        for k, pair in enumerate((*pairs, *inputs)):
+            is_input = k >= len(pairs)
+            rows = range(row, row + (1 if is_input else len(pair.residual_kinds)))
+            row = rows.stop
+            is_moving = tuple(link in links for link in pair.bodies)
+            counts = len(own_columns.get(pair.name, ())), len(pair.number_kinds)
+            key = _GroupKey(recorded_pair_formula(pair, is_input, is_moving, *counts), is_input, is_moving, counts)
+            members.setdefault(key, []).append((pair, rows, self._coordinate_count + k - len(pairs)))
+        groups = []
+        for key, group in members.items():
+            pair = group[0][0]
+            groups.append(
+                _PairGroup(
+                    key,
+                    pair,
+                    tuple(member.name for member, *_ in group),
+                    _index_columns([[links[link] for link in member.bodies if link in links] for member, *_ in group]),
+                    _index_columns([rows for _, rows, _ in group]),
+                    _index_columns([own_columns.get(member.name, ()) for member, *_ in group]),
+                    np.array([column for *_, column in group if key.is_input], dtype=int),
+                    # the relative motion of an input that no pair stands for has no numbers, nor does it need any
+                    _index_columns([numbers.get(member.name, [0] * len(pair.number_kinds)) for member, *_ in group]),
+                )
             )
-            for group in _pair_groups(tuple(mechanism.pairs), inputs, links)
-        ]
+        return groups
 
     def evaluate(self, motion: Array, p: Array) -> ConstraintRows:
         """What samples of (w, u) leave open, alone (1, entries, samples) or with their rates (3, entries, samples).
@@ -171,19 +186,21 @@ class ConstraintCheck:
         p are the numbers (numbers,), or (numbers, samples) where they differ.
         """
         orders, samples = motion.shape[0], motion.shape[-1]
-        frames = _frames(motion[:, self._frame_columns])
+        links = motion[:, : 3 * self._link_count].reshape(orders, self._link_count, 3, samples)
+        frames = _frames(links.swapaxes(1, 2))
         rows: Array = np.zeros((1 if orders == 1 else RESULTS_OF_ROW, self._row_count, samples), dtype=motion.dtype)
         gaps: list[tuple[str, Array]] = []
-        for group in self._groups if samples else ():
+        for group in self.groups if samples else ():
             for part in group.parts(samples):
                 rows[:, group.rows[:, part]], of_contacts = group.evaluate(part, frames, motion, p)
-                names = group.group.names[part]
+                names = group.names[part]
                 gaps += [(names[k], gap[:, k]) for gap in of_contacts for k in range(len(names))]
         rows[0, self._angles] = closing_error(rows[0, self._angles], MeasureKind.ANGLE)
         return ConstraintRows(rows[:orders], rows[orders:], gaps, frames)
 
-    def judge(self, motion: Array, p: Array) -> ConstraintJudgement:
-        """Judge samples of (w, u) with their rates (3, entries, samples)."""
+    def judge(self, motion: Array, p: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Judge samples of (w, u) with their rates (3, entries, samples): residual, finite sum, velocity error,
+        acceleration error and contact gap (samples,), see `AcceptanceResult`."""
         evaluated = self.evaluate(motion, p)
         residual = greatest_entries(self.residuals(evaluated, motion))
         velocity, acceleration = map(greatest_entries, self.rate_errors(evaluated))
@@ -191,7 +208,7 @@ class ConstraintCheck:
         if evaluated.gaps:
             scales = self.contact_scales(evaluated, motion)
             contact = greatest_entries(np.concatenate([np.abs(gap) / scales for _, gap in evaluated.gaps]))
-        return ConstraintJudgement(residual, evaluated.rows.sum(axis=(0, 1)), velocity, acceleration, contact)
+        return residual, evaluated.rows.sum(axis=(0, 1)), velocity, acceleration, contact
 
     def residuals(self, evaluated: ConstraintRows, motion: Array) -> Array:
         """How far constraints are open (constraints, samples), beside the turns that angles count.
@@ -199,7 +216,8 @@ class ConstraintCheck:
         The round-off of an angle, and of where its cos and sin put things, grows with them.
         """
         counted = np.concatenate([np.abs(evaluated.frames[0, 4]), np.abs(motion[0, self._own])])
-        return np.abs(evaluated.rows[0]) / _at_least_one(greatest_entries(counted) / (2.0 * pi))
+        turns = greatest_entries(counted) / (2.0 * pi)
+        return np.abs(evaluated.rows[0]) / greatest_entries(np.stack([turns, 0.0 * turns + 1.0]))
 
     def rate_errors(self, evaluated: ConstraintRows) -> tuple[Array, Array]:
         """How far first and second rates break constraints, as parts of their terms (constraints, samples)."""
@@ -221,47 +239,19 @@ class ConstraintCheck:
         return np.stack([0.0 * greatest + 1.0, _nonzero(greatest), _nonzero(of_arcs)])
 
 
-def _pair_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
-    """Pairs, then inputs, of a mechanism with these moving links, that are computed together."""
+def constraint_check(mechanism: Mechanism, coordinate_count: int) -> ConstraintCheck:
+    """The constraints of a mechanism of so many coordinates; mechanisms of equal pairs share them."""
+    motions = relative_motions(mechanism)
+    inputs = tuple(motions[driven.pair] for driven in mechanism.inputs)
+    moving = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
+    pairs = tuple(mechanism.pairs)
     try:
-        hash(pairs)
+        return _cached_check(pairs, inputs, moving, coordinate_count)
     except TypeError:  # made in Python, of lists
-        return _make_groups(pairs, inputs, moving)
-    return _cached_groups(pairs, inputs, moving)
+        return ConstraintCheck(pairs, inputs, moving, coordinate_count)
 
 
-def _make_groups(pairs: tuple[Pair, ...], inputs: tuple[Pair, ...], moving: tuple[str, ...]) -> tuple[_PairGroup, ...]:
-    links = {link: k for k, link in enumerate(moving)}
-    own = consecutive_ranges({pair.name: len(pair.coordinate_kinds) for pair in pairs})
-    members: dict[Hashable, list[tuple[Pair, bool, tuple[bool, ...], range]]] = {}
-    row = 0
-    for k, pair in enumerate((*pairs, *inputs)):
-        is_input = k >= len(pairs)
-        rows = range(row, row + (1 if is_input else len(pair.residual_kinds)))
-        row = rows.stop
-        is_moving = tuple(link in links for link in pair.bodies)
-        counts = len(own.get(pair.name, ())), len(pair.number_kinds)
-        key = recorded_pair_formula(pair, is_input, is_moving, *counts), is_input, is_moving, counts
-        members.setdefault(key, []).append((pair, is_input, is_moving, rows))
-    groups = []
-    for formula, group in members.items():
-        pair, is_input, is_moving, _ = group[0]
-        groups.append(
-            _PairGroup(
-                formula,
-                pair,
-                is_input,
-                is_moving,
-                tuple(member.name for member, *_ in group),
-                _index_columns([[links[link] for link in member.bodies if link in links] for member, *_ in group]),
-                _index_columns([own.get(member.name, ()) for member, *_ in group]),
-                _index_columns([rows for *_, rows in group]),
-            )
-        )
-    return tuple(groups)
-
-
-_cached_groups = lru_cache(maxsize=MAX_CACHED_GROUPINGS)(_make_groups)
+_cached_check = lru_cache(maxsize=MAX_CACHED_CHECKS)(ConstraintCheck)
 
 
 def _index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
@@ -272,11 +262,7 @@ def _index_columns(indices: Sequence[Sequence[int]]) -> IntArray:
 
 def _nonzero(scale: Array) -> Array:
     """What is divided by; one where nothing moves."""
-    return elementwise(lambda each: each + 1.0 * (each <= 0.0), scale)
-
-
-def _at_least_one(values: Array) -> Array:
-    return greatest_entries(np.stack([values, 0.0 * values + 1.0]))
+    return elementwise(lambda size: size + 1.0 * (size <= 0.0), scale)
 
 
 def _frames(coordinates: Array) -> Array:
@@ -298,10 +284,10 @@ def _frames(coordinates: Array) -> Array:
 
 
 def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
-    pair, is_input, has_rates = group.pair, group.is_input, orders == ORDERS
+    pair, is_input, has_rates = group.pair, group.key.is_input, orders == ORDERS
     counts = [orders * PARTS_OF_FRAME] * len(group.bodies)
-    counts += [orders * len(group.own), orders * is_input, len(pair.number_kinds)]
-    ends = np.cumsum(counts)
+    counts += [orders * len(group.own_columns), orders * is_input, len(pair.number_kinds)]
+    stops = np.cumsum(counts)
 
     def jets(entries: Sequence[RecordedNumber], sizes: bool) -> list[Scalar]:
         if not has_rates:
@@ -310,34 +296,34 @@ def _record_check(group: _PairGroup, orders: int) -> FormulaFunction:
         return [term_sizes(value) for value in values] if sizes else values
 
     def formula(arguments: Sequence[RecordedNumber]) -> list[Scalar]:
-        parts = [arguments[end - count : end] for count, end in zip(counts, ends, strict=True)]
+        parts = [arguments[end - count : end] for count, end in zip(counts, stops, strict=True)]
         numbers = parts[-1]
 
         def values(sizes: bool) -> tuple[list[Scalar], list[Scalar]]:
             """The residuals, and what is own of the pair."""
             moving = iter(parts[:-3])
             frames = []
-            for moves in group.is_moving:
+            for moves in group.key.is_moving:
                 x, y, cosine, sine, angle = jets(next(moving), sizes) if moves else GROUND[:5]
                 is_sized = moves and sizes
                 frames.append(
                     frame_term_sizes(x, y, angle) if is_sized else Frame(x, y, cosine, sine, angle, not moves)
                 )
-            own = jets(parts[-3], sizes)
-            residuals = pair_formula(pair, is_input)(frames, numbers, own)
+            own_coordinates = jets(parts[-3], sizes)
+            residuals = pair_formula(pair, is_input)(frames, numbers, own_coordinates)
             positions = jets(parts[-2], sizes) if is_input else [0.0] * len(residuals)
-            return [value - position for value, position in zip(residuals, positions, strict=True)], own
+            return [value - position for value, position in zip(residuals, positions, strict=True)], own_coordinates
 
-        residuals, own = values(False)
+        residuals, own_coordinates = values(False)
         if not has_rates:
             return residuals
         terms, _ = values(True)
         rows = [[*value_and_rates(value)] for value in residuals]
         sizes = [value.parts[1:] if isinstance(value, TermSizes) else (0.0, 0.0) for value in terms]
-        gap = pair.contact_gap(numbers, own) if not is_input else 0.0
+        gap = pair.contact_gap(numbers, own_coordinates) if not is_input else 0.0
         results = [[*row, *size] for row, size in zip(rows, sizes, strict=True)]
         by_result = [row[k] for k in range(RESULTS_OF_ROW) for row in results]
         return [*by_result, *(gap.parts if isinstance(gap, Jet) else ())]
 
-    recorded = record_formula(formula, int(ends[-1]))
+    recorded = record_formula(formula, int(stops[-1]))
     return FormulaFunction(recorded, counts, ((1, len(recorded.results)),))

@@ -25,7 +25,7 @@ class Coordinate(NamedTuple):
 
 def coordinate_columns(coordinates: Iterable[Coordinate]) -> dict[tuple[str, str], int]:
     """Where in w each part of a link or a pair stands."""
-    return {(each.owner, each.part): k for k, each in enumerate(coordinates)}
+    return {(coordinate.owner, coordinate.part): k for k, coordinate in enumerate(coordinates)}
 
 
 def consecutive_ranges(counts: Mapping[str, int], first: int = 0) -> dict[str, range]:
@@ -51,5 +51,7 @@ def frames_from_coordinates(
         link: frame_at(*(w[column[link, part]] for part in FRAME_PARTS)) if (link, "x") in column else GROUND
         for link in links
     }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}
-    return frames, own
+    own_coordinates = {
+        name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()
+    }
+    return frames, own_coordinates

@@ -188,15 +188,15 @@ class EarlierRows:
         """Take rows of earlier blocks into a constraint between two of their coordinates if that makes it short."""
         for place in range(len(self._order), len(self._solved)):
             self._order[self._solved[place][0]] = place
-        ends = [column for column in line.factors if column in self._order]
+        endpoints = [column for column in line.factors if column in self._order]
         sums = dict(line.factors), dict(line.multipliers)
-        if len(ends) != 2 or substitute_solutions(*sums, self._solved, self._order, MAX_SHORT_LOOP):
+        if len(endpoints) != 2 or substitute_solutions(*sums, self._solved, self._order, MAX_SHORT_LOOP):
             return
-        path = self._path_between(*ends)
+        path = self._path_between(*endpoints)
         if path is None:
             return
         factors, multipliers = dict(line.factors), dict(line.multipliers)
-        column = ends[0]
+        column = endpoints[0]
         for other, by in path:
             substitute_solution(factors, multipliers, column, by)
             column = other
@@ -232,7 +232,7 @@ def back_substitute(
     solved: Sequence[tuple[int, EliminationRow]],
     symbols: CoordinateSymbols,
     rests: Sequence[ca.SX],
-    wanted: list[ca.SX],
+    expressions: list[ca.SX],
 ) -> list[ca.SX]:
     """Expressions with every coordinate replaced: the remaining ones as given, the solved ones by their constraints, in
     an order in which they can be computed."""
@@ -253,7 +253,7 @@ def back_substitute(
         if column in symbols.cos_sin:
             replaced += symbols.cos_sin[column]
             by += _cos_sin_of_sum(by[-1], others, rest, symbols)
-    return ca.substitute_inplace(replaced, by, wanted)[1] if replaced else wanted
+    return ca.substitute_inplace(replaced, by, expressions)[1] if replaced else expressions
 
 
 def _cos_sin_of_sum(angle: ca.SX, others: dict[int, float], rest: ca.SX, symbols: CoordinateSymbols) -> list[ca.SX]:
@@ -290,7 +290,7 @@ def dependency_order(solved: EliminationSteps) -> EliminationSteps:
 
 def expression_unknowns(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
     """The entries of z on which each expression depends."""
-    found: list[set[int]] = [set() for _ in range(expressions.numel())]
+    unknowns: list[set[int]] = [set() for _ in range(expressions.numel())]
     for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
-        found[row].add(column)
-    return found
+        unknowns[row].add(column)
+    return unknowns

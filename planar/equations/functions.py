@@ -12,16 +12,9 @@ from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations
 from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
 from planar.equations.block_types import PlacedBlock, place_blocks
-from planar.equations.closed_form_assemblies import ClosedFormAssemblies
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.placed_blocks import (
-    BlockAssemblyCall,
-    BlockCall,
-    KnownCoordinates,
-    PlacedAssemblies,
-    PlacedBlockCall,
-)
+from planar.equations.placed_blocks import BlockCall, ClosedFormAssemblies, KnownCoordinates, PlacedBlockCall
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
 from planar.equations.symbolic_equations import (
@@ -73,11 +66,13 @@ class EquationFunctions:
         self.equations = equations
         if formulas is not None:
             self.formulas = formulas
-        self._unknown_count, self._row_count = len(equations.unknowns), len(equations.rows)
-        is_square = equations.is_square and self._unknown_count == self._row_count
-        self.is_sparse = is_square and self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
+        self._unknown_count = len(equations.unknowns)
+        is_large = self._unknown_count > MAX_DENSE_UNKNOWNS and equations.elimination is not None
+        self.is_sparse = is_large and equations.is_square
         "whether Jacobians are by their entries"
         self._evaluation_count = 0.0
+        self._block_calls: dict[int, BlockCall] = {}
+        self._block_assemblies: dict[int, ClosedFormAssemblies | None] = {}
 
     @cached_property
     def formulas(self) -> StructureFormulas:
@@ -104,13 +99,9 @@ class EquationFunctions:
             self._block_calls[block.block_index] = (
                 self.formulas.block_call(block)
                 if by_type is None
-                else PlacedBlockCall(block, by_type.closing, self._known_coordinates)
+                else PlacedBlockCall(by_type.closing, self._known_coordinates.arguments_of(block))
             )
         return self._block_calls[block.block_index]
-
-    @cached_property
-    def _block_calls(self) -> dict[int, BlockCall]:
-        return {}
 
     def _functions_of_type(self, block: Block) -> BlockTypeFunctions | None:
         """The functions of a block's type; None for one that has none."""
@@ -130,30 +121,26 @@ class EquationFunctions:
         assert self.equations.assembled is not None
         return KnownCoordinates(self.equations, self.equations.assembled, self.placed_blocks, calls)
 
-    def block_assemblies(self, block: Block) -> BlockAssemblyCall | None:
+    def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         """Both assemblies of a block; None for one without a closed form."""
         if block.block_index not in self._block_assemblies:
             self._block_assemblies[block.block_index] = self._make_assemblies(block)
         return self._block_assemblies[block.block_index]
 
-    @cached_property
-    def _block_assemblies(self) -> dict[int, BlockAssemblyCall | None]:
-        return {}
-
-    def _make_assemblies(self, block: Block) -> BlockAssemblyCall | None:
+    def _make_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         by_type = self._functions_of_type(block)
         if by_type is not None:
-            assemblies = by_type.assemblies
-            return assemblies and PlacedAssemblies(block, assemblies, self._known_coordinates)
+            form = by_type.assemblies
+            return form and form.placed(self._known_coordinates.arguments_of(block))
         from planar.equations.closed_form import closed_form_formula  # nearly all blocks have a type
 
         e = self.equations
-        form = closed_form_formula(e, block)
-        if form is None:
+        formula, has_changing_arm = closed_form_formula(e, block)
+        if formula is None:
             return None
-        counts = *(symbol.numel() for symbol in (e.z, e.u, e.p)), 1
-        function = FormulaFunction(form.formula, counts, ((1, slice_length(block.unknowns)), (1, 1)))
-        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), form.has_changing_arm)
+        shapes = (1, slice_length(block.unknowns)), (1, 1)
+        function = FormulaFunction(formula, (*e.argument_counts, 1), shapes)
+        return ClosedFormAssemblies(block.unknowns, function, self.block_call(block), has_changing_arm)
 
     def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), as far as known ahead of a block; the rest of it may hold anything."""
@@ -163,8 +150,8 @@ class EquationFunctions:
 
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
-        many = np.atleast_2d(z)
-        w = self._evaluator(len(many)).coordinates(many, np.broadcast_to(u, (len(many), u.shape[-1])), p)
+        samples = np.atleast_2d(z)
+        w = self._evaluator(len(samples)).coordinates(samples, np.broadcast_to(u, (len(samples), u.shape[-1])), p)
         return w[0] if z.ndim == 1 else w
 
     @cached_property
@@ -212,17 +199,17 @@ class EquationFunctions:
         rates = np.concatenate([z1, u1])
         residuals, jacobian = self.residuals_and_jacobian(z, u, p)
         slopes = np.asarray(jacobian)
-        change = self.jacobian_changes(np.concatenate([z, u]), rates[None], p)[0]
-        own = slice(0, self._unknown_count)
-        system = np.block([[slopes[:, own], 0.0 * slopes[:, own]], [change[:, own], slopes[:, own]]])
+        changes = self.jacobian_changes(np.concatenate([z, u]), rates[None], p)[0]
+        by_z, change = slopes[:, : self._unknown_count], changes[:, : self._unknown_count]
+        system = np.block([[by_z, 0.0 * by_z], [change, by_z]])
         return np.concatenate([residuals, slopes @ rates]), system
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
-        many = np.atleast_2d(y)
-        evaluator = self._evaluator(len(many))
-        y1, y2 = np.broadcast_to(y1, many.shape), np.broadcast_to(y2, many.shape)
-        residuals, coordinates, entries = evaluator.kinematics(many, y1, y2, p)
+        samples = np.atleast_2d(y)
+        evaluator = self._evaluator(len(samples))
+        y1, y2 = np.broadcast_to(y1, samples.shape), np.broadcast_to(y2, samples.shape)
+        residuals, coordinates, entries = evaluator.kinematics(samples, y1, y2, p)
         if y.ndim == 1:
             residuals, coordinates, entries = residuals[0], coordinates[0], entries[0]
         orders = (values[..., order, :] for values in (residuals, coordinates) for order in range(3))
@@ -239,16 +226,11 @@ class EquationFunctions:
 
     def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array | SparseMatrices, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
-        samples, unknowns = z.shape
-        if self._row_count == 0:
-            return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, u.shape[1]))
-        evaluator = self._evaluator(samples)
-        return self._split_entries(evaluator.residuals_and_jacobians(z, u, p).entries, evaluator.pattern)
+        evaluator = self._evaluator(len(z))
+        return self._split_entries(evaluator.residuals_and_jacobians(z, u, p)[1], evaluator.pattern)
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
-        if not len(self.equations.rows):
-            return np.zeros(0), np.zeros((0, len(z) + len(u)))
         evaluator = self._evaluator()
         residuals, entries = evaluator.residuals_and_jacobians(z[None], u[None], p)
         jacobian = SparseMatrices(evaluator.pattern, entries[0])

@@ -44,8 +44,6 @@ BINARY_OPERATIONS = {
     ca.OP_LT: "less",
     ca.OP_LE: "most",
 }
-
-
 FORMULA_OPERATIONS = {
     ca.OP_POW: "pow",
     ca.OP_CONSTPOW: "pow",
@@ -56,20 +54,18 @@ FORMULA_OPERATIONS = {
 """What formulas of pairs may have beside what machine code knows."""
 
 
-def apply_operation(code: int, operands: Sequence[Any]) -> Any:
-    """What an operation of casadi makes of numbers of any kind. Raises KeyError for one that is not of `OPERATIONS`."""
-    return OPERATIONS[code](*operands)
-
-
 def evaluate_function(
     function: ca.Function,
     inputs: Sequence[Sequence[Any]],
     convert: Callable[[float], Any],
-    apply: Callable[[int, list[Any]], Any] = apply_operation,
+    apply: Callable[[int, list[Any]], Any] = lambda code, operands: OPERATIONS[code](*operands),
 ) -> list[list[Any]]:
-    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation."""
+    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation.
+
+    By default those of `OPERATIONS`; raises KeyError for another.
+    """
     work: dict[int, Any] = {}
-    found: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
+    results: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
     places = [function.sparsity_out(k).find() for k in range(function.n_out())]
     for k in range(function.n_instructions()):
         code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
@@ -78,10 +74,10 @@ def evaluate_function(
         elif code == ca.OP_CONST:
             work[out[0]] = convert(function.instruction_constant(k))
         elif code == ca.OP_OUTPUT:
-            found[out[0]][places[out[0]][out[1]]] = work[of[0]]
+            results[out[0]][places[out[0]][out[1]]] = work[of[0]]
         else:
-            work[out[0]] = apply(code, [work[each] for each in of])
-    return found
+            work[out[0]] = apply(code, [work[operand] for operand in of])
+    return results
 
 
 def inline_function(
@@ -122,3 +118,18 @@ def recorded_function(function: ca.Function) -> RecordedFormula:
     inputs = [[instructions.add_input(sum(sizes[:k]) + place) for place in range(size)] for k, size in enumerate(sizes)]
     results = inline_function(instructions, function, inputs, FORMULA_OPERATIONS)
     return formula_of_results(instructions, [number for result in results for number in result])
+
+
+def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:
+    """Whether an expression changes its formula as these symbols change."""
+    others = [symbol for symbol in ca.symvar(expression) if not ca.depends_on(symbols, symbol)]
+    function = ca.Function("pieces", [symbols, ca.vertcat(ca.SX(0, 1), *others)], [expression])
+    choices: list[int] = []
+
+    def depends(code: int, operands: list[bool]) -> bool:
+        if any(operands) and code in (ca.OP_FLOOR, ca.OP_LT, ca.OP_LE):
+            choices.append(code)
+        return any(operands)
+
+    evaluate_function(function, [[True] * symbols.numel(), [False] * len(others)], lambda _: False, depends)
+    return bool(choices)

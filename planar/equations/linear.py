@@ -87,14 +87,14 @@ def solve_by_elimination(matrix: ca.SX, right_side: ca.SX, sample: Array) -> ca.
     rows = [[*(matrix[i, j] for j in range(count)), right_side[i]] for i in range(count)]
     numbers = np.array(sample, dtype=float)
     pivots: list[tuple[int, int]] = []
-    left, free = list(range(count)), list(range(count))
-    while left:
-        i, j = max(((i, j) for i in left for j in free), key=lambda at: abs(float(numbers[at])))
+    open_rows, free = list(range(count)), list(range(count))
+    while open_rows:
+        i, j = max(((i, j) for i in open_rows for j in free), key=lambda place: abs(float(numbers[place])))
         pivots.append((i, j))
-        left.remove(i)
+        open_rows.remove(i)
         free.remove(j)
         scale = 1.0 / rows[i][j]
-        for other in left:
+        for other in open_rows:
             if not rows[other][j].is_zero():
                 factor = rows[other][j] * scale
                 rows[other] = [a if b.is_zero() else a - factor * b for a, b in zip(rows[other], rows[i], strict=True)]
@@ -110,18 +110,18 @@ def solve_by_elimination(matrix: ca.SX, right_side: ca.SX, sample: Array) -> ca.
 def _minors(matrix: ca.SX) -> dict[tuple[int, ...], ca.SX]:
     """The determinants of all rows with as many columns, by those of two rows at a time (Laplace)."""
     rows, columns = matrix.shape
-    here: dict[tuple[int, ...], ca.SX] = {(): ca.SX(1.0)}
+    minors: dict[tuple[int, ...], ca.SX] = {(): ca.SX(1.0)}
     for first in range(0, rows, 2):
         pair = matrix[first : min(first + 2, rows), :]
-        found: dict[tuple[int, ...], ca.SX] = {}
-        for chosen, value in here.items():
+        next_minors: dict[tuple[int, ...], ca.SX] = {}
+        for chosen, value in minors.items():
             rest = [k for k in range(columns) if k not in chosen]
-            for own, minor in _row_minors(pair, rest):
-                sign = -1.0 if sum(a > b for a in chosen for b in own) % 2 else 1.0
-                key = tuple(sorted((*chosen, *own)))
-                found[key] = found.get(key, ca.SX(0.0)) + sign * value * minor
-        here = found
-    return here
+            for added, minor in _row_minors(pair, rest):
+                sign = -1.0 if sum(a > b for a in chosen for b in added) % 2 else 1.0
+                key = tuple(sorted((*chosen, *added)))
+                next_minors[key] = next_minors.get(key, ca.SX(0.0)) + sign * value * minor
+        minors = next_minors
+    return minors
 
 
 def _row_minors(rows: ca.SX, columns: Sequence[int]) -> list[tuple[tuple[int, ...], ca.SX]]:
@@ -168,11 +168,11 @@ def solve_arrays(
     regular = np.array(known)
     regular[known] = np.abs(np.linalg.det(matrices[known])) > least_determinant
     right_sides = np.broadcast_to(right_sides, (*matrices.shape[:-1], right_sides.shape[-1]))
-    found = np.full(right_sides.shape, np.nan)
-    found[regular] = np.linalg.solve(matrices[regular], right_sides[regular])
+    solutions = np.full(right_sides.shape, np.nan)
+    solutions[regular] = np.linalg.solve(matrices[regular], right_sides[regular])
     if least_squares:
-        found[~regular] = np.linalg.pinv(np.nan_to_num(matrices[~regular])) @ right_sides[~regular]
-    return found
+        solutions[~regular] = np.linalg.pinv(np.nan_to_num(matrices[~regular])) @ right_sides[~regular]
+    return solutions
 
 
 def _substitute_blocks(matrices: SparseMatrices, right_sides: Array) -> Array:
@@ -213,6 +213,6 @@ def _pseudo_inverses(matrices: Array) -> Array:
     known = np.all(np.isfinite(matrices), axis=(-2, -1))
     if np.all(known):
         return np.linalg.pinv(matrices, rcond=RANK_TOLERANCE)
-    found = np.full((*matrices.shape[:-2], *matrices.shape[:-3:-1]), np.nan)
-    found[known] = np.linalg.pinv(matrices[known], rcond=RANK_TOLERANCE)
-    return found
+    inverses = np.full((*matrices.shape[:-2], *matrices.shape[:-3:-1]), np.nan)
+    inverses[known] = np.linalg.pinv(matrices[known], rcond=RANK_TOLERANCE)
+    return inverses

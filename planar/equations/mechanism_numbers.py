@@ -15,18 +15,18 @@ from planar.model.pairs import MeasureKind, Pair
 
 def equation_structure(mechanism: Mechanism) -> Mechanism:
     """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
-    found: Mechanism | None = mechanism.__dict__.get("_equation_structure")  # kept: asked often, and hashed
-    if found is None:
-        found = Mechanism(
+    structure: Mechanism | None = mechanism.__dict__.get("_equation_structure")  # kept: asked often, and hashed
+    if structure is None:
+        structure = Mechanism(
             name="",
             frame=mechanism.frame,
             links=tuple(Link(link.name) for link in mechanism.links),
             pairs=mechanism.pairs,
-            inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+            inputs=tuple(Input(driven.pair, 0.0) for driven in mechanism.inputs),
             closes_within=None if mechanism.closes_within is None else 0.0,
         )
-        object.__setattr__(mechanism, "_equation_structure", found)
-    return found
+        object.__setattr__(mechanism, "_equation_structure", structure)
+    return structure
 
 
 def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
@@ -37,28 +37,25 @@ def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
 def mechanism_size(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> float:
     """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
     named = relative_motions(mechanism)
-    slide = [named[given.pair].input_kind is MeasureKind.LENGTH for given in mechanism.inputs]
+    slide = [named[driven.pair].input_kind is MeasureKind.LENGTH for driven in mechanism.inputs]
     return size_from_extents(mechanism, {name: shape_extent(shape) for name, shape in shapes.items()}, slide)
 
 
 def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_slide: Sequence[bool]) -> float:
     """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
-    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
+    slides = [abs(driven.position) for driven, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
     return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
 
 
 def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
-    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
-    return pair_numbers_from(mechanism, measured, unit)
+    return np.array([number for pair in mechanism.pairs for number in scaled_pair_numbers(pair, shapes, unit)], float)
 
 
 def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
     """p from the numbers of every pair, lengths divided by `unit`."""
-    found: list[float] = []
-    for pair in mechanism.pairs:
-        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
-    return np.array(found, dtype=float)
+    scaled = (scale_lengths(numbers[pair.name], pair.number_kinds, unit) for pair in mechanism.pairs)
+    return np.array([number for part in scaled for number in part], dtype=float)
 
 
 def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: Scalar) -> list[Scalar]:

@@ -11,19 +11,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from planar.equations.assembled_equations import AssembledJacobians
-from planar.equations.closed_form_assemblies import ArrayFunction
+from planar.equations.block_motion import DIFFERENCE_STEP
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
-from planar.equations.large_block_motion import DIFFERENCE_STEP
+from planar.equations.placed_blocks import BlockCall
 from planar.equations.residuals import ConstraintRow
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
 from planar.equations.symbolic_equations import Block, ConstraintEquations, ConstraintExpressions
 from planar.foundation.arrays import Array
+from planar.foundation.lazy_module import LazyModule
 from planar.model.pairs import MeasureKind
 
 if TYPE_CHECKING:
     import casadi as ca
+else:
+    ca = LazyModule("casadi")  # few structures have such equations
 
 CIRCLE_POINTS, CIRCLE_RADIUS = 32, 0.25
 """Of a circle in complex time: aliased powers of the series are below round-off with this many points."""
@@ -108,22 +110,18 @@ def with_rank_conditions(functions: EquationFunctions, parts: Mapping[int, LowRa
 def _conditioned_expressions(
     e: ConstraintEquations, parts: Sequence[LowRankBlock], order: Sequence[int]
 ) -> ConstraintExpressions:
-    """The same as expressions, from which polynomials can be made."""
-    import casadi as ca  # few structures have such equations
-
+    """F with the conditions, and w, as expressions, from which polynomials can be made."""
     F = [e.F]
     for part in parts:
         scales = np.multiply.outer(part.row_scales, part.column_scales)
         matrix = ca.densify(e.jacobian[list(part.rows), list(part.columns)]) / ca.DM(scales)
-        F += [_symbolic_determinant(ca.mtimes([ca.DM(rows), matrix, ca.DM(columns)])) for rows, columns in part.minors]
+        F += [symbolic_determinant(ca.mtimes([ca.DM(rows), matrix, ca.DM(columns)])) for rows, columns in part.minors]
     return e.expressions._replace(F=ca.vertcat(*F)[list(order)])
 
 
-def _symbolic_determinant(matrix: ca.SX) -> ca.SX:
+def symbolic_determinant(matrix: ca.SX) -> ca.SX:
     """A determinant without division, which would fail where it is to vanish (R. Bird, A simple division-free algorithm
     for computing determinants, Inf. Process. Lett. 111, 2011)."""
-    import casadi as ca
-
     size, part = matrix.size1(), matrix
     for _ in range(size - 1):
         upper = ca.triu(part, False)
@@ -135,11 +133,16 @@ def _symbolic_determinant(matrix: ca.SX) -> ca.SX:
 
 class ConditionedEquations(StructureFormulas):
     """The equations of one structure with conditions on the rank of parts of its Jacobian; `order` says which of the
-    constraints, then conditions, every row is."""
+    constraints, then conditions, every row is.
+
+    By matrices of numbers: as formulas minors would grow with the fourth power of the rank, which is twenty and more
+    where a part has the constraints of earlier blocks.
+    """
 
     def __init__(
         self, equations: ConstraintEquations, base: StructureFormulas, parts: Sequence[LowRankBlock], order: list[int]
     ):
+        vars(self).update(vars(base))  # coordinates are the same
         self._equations, self._base, self._parts, self._order = equations, base, parts, order
         rows, columns = len(order), base.pattern.shape[1]
         first = rows * np.arange(columns + 1)
@@ -149,10 +152,6 @@ class ConditionedEquations(StructureFormulas):
     def recorded(self) -> StructureFormulas:
         """The same as formulas that can be printed."""
         return StructureFormulas(self._equations)
-
-    def coordinates(self, z: Array, u: Array, p: Array) -> Array:
-        """As `StructureFormulas.coordinates`."""
-        return self._base.coordinates(z, u, p)
 
     def _conditions(self, jacobians: Array) -> Array:
         """The conditions and their rates (orders, samples, conditions), from those of J (orders, samples, rows, y)."""
@@ -168,46 +167,40 @@ class ConditionedEquations(StructureFormulas):
         jacobians = [self._base.jacobian_rate(rates[: order + 1], p) for order in range(len(rates))]
         return self._conditions(np.stack(jacobians))
 
-    def _with_conditions(self, y: Array, p: Array) -> AssembledJacobians:
-        """F with conditions (samples, rows), and the entries of dF/dy, at y (samples, y)."""
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+        """As `StructureFormulas.residuals_and_jacobians`."""
+        residuals, base_entries = self._base.residuals_and_jacobians(z, u, p)
+        jacobians = np.asarray(SparseMatrices(self._base.pattern, base_entries))
+        y = np.hstack([z, np.broadcast_to(u, (len(z), u.shape[-1]))])
         samples, count = y.shape
-        split = self._base.unknown_count
-        residuals, base_entries = self._base.residuals_and_jacobians(y[:, :split], y[:, split:], p)
-        here = np.asarray(SparseMatrices(self._base.pattern, base_entries))
         units = np.tile(np.eye(count), (samples, 1))
         changes = self._base.jacobian_changes(np.repeat(y, count, axis=0), units, p)
-        values, slopes = self._conditions(np.stack([np.repeat(here, count, axis=0), changes]))
-        columns = np.concatenate([here.swapaxes(1, 2), slopes.reshape(samples, count, -1)], axis=2)[..., self._order]
-        return AssembledJacobians(np.hstack([residuals, values[::count]])[:, self._order], columns.reshape(samples, -1))
-
-    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
-        """As `StructureFormulas.residuals_and_jacobians`."""
-        return self._with_conditions(np.hstack([z, np.broadcast_to(u, (len(z), u.shape[-1]))]), p)
+        values, slopes = self._conditions(np.stack([np.repeat(jacobians, count, axis=0), changes]))
+        columns = np.concatenate([jacobians.swapaxes(1, 2), slopes.reshape(samples, count, -1)], axis=2)
+        rows = np.hstack([residuals, values[::count]])
+        return rows[:, self._order], columns[..., self._order].reshape(samples, -1)
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """As `StructureFormulas.kinematics`."""
         residuals, coordinates, _ = self._base.kinematics(y, y1, y2, p)
         conditions = self._condition_rates((y, y1, y2), p).swapaxes(0, 1)
         rows = np.concatenate([residuals, conditions], axis=2)[..., self._order]
-        return rows, coordinates, self._with_conditions(y, p).entries
+        split = self._base.unknown_count
+        return rows, coordinates, self.residuals_and_jacobians(y[:, :split], y[:, split:], p)[1]
 
     def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """As `StructureFormulas.third_residual_rates`."""
         conditions = self._condition_rates(rates, p)[3]
         return np.hstack([self._base.third_residual_rates(rates, p), conditions])[:, self._order]
 
-    def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """As `StructureFormulas.third_coordinate_rates`."""
-        return self._base.third_coordinate_rates(rates, p)
-
     def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
         """As `StructureFormulas.jacobian_changes`, from second rates along sums and differences of directions."""
-        units, many = np.eye(len(y)), len(directions)
+        units, count = np.eye(len(y)), len(directions)
         sums = (directions[:, None] + sign * units for sign in (1.0, -1.0))
-        rates = np.concatenate([ways.reshape(-1, len(y)) for ways in sums])
+        rates = np.concatenate([part.reshape(-1, len(y)) for part in sums])
         places = np.repeat(y[None], len(rates), axis=0)
         second = self.kinematics(places, rates, 0.0 * rates, p)[0][:, 2]
-        ahead, behind = second.reshape(2, many, len(y), -1)
+        ahead, behind = second.reshape(2, count, len(y), -1)
         return (0.25 * (ahead - behind)).swapaxes(1, 2)
 
     def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
@@ -226,13 +219,9 @@ class ConditionedEquations(StructureFormulas):
             return np.concatenate([constraints, values[:, rows:]], axis=1)
 
         none = np.zeros((samples, slopes.shape[2]))
-        return RoundingTerms(
-            with_conditions(terms.value, none),
-            with_conditions(terms.term_sum, none),
-            *(with_conditions(of_constraints, own) for of_constraints, own in zip(terms[2:], slopes, strict=True)),
-        )
+        return RoundingTerms(*map(with_conditions, terms, (none, none, *slopes)))
 
-    def block_call(self, block: Block) -> ArrayFunction:
+    def block_call(self, block: Block) -> BlockCall:
         """As `StructureFormulas.block_call`."""
         return _BlockOfConditioned(self, block)
 

@@ -21,15 +21,15 @@ def time_derivatives(value: ca.SX, y: ca.SX, *rates: ca.SX) -> list[ca.SX]:
     Those but the last have to be symbols. The chain rule: what an order is made of is y, y', ..., and the next one
     is the sum of its derivatives by each, times the rate of that.
     """
-    found: list[ca.SX] = []
+    derivatives: list[ca.SX] = []
     for order, last in enumerate(rates):
         # the last rate stands in it as y' stands in the first
         rate = ca.jtimes(value, y, last)
-        if found:
-            parts = [ca.jtimes(found[-1], of, by) for of, by in zip((y, *rates), rates[:order], strict=False)]
+        if derivatives:
+            parts = [ca.jtimes(derivatives[-1], of, by) for of, by in zip((y, *rates), rates[:order], strict=False)]
             rate = sum(parts[1:], parts[0]) + rate
-        found.append(rate)
-    return found
+        derivatives.append(rate)
+    return derivatives
 
 
 def first_and_second_rates(value: ca.SX, y: ca.SX, y1: ca.SX, y2: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -55,14 +55,15 @@ class UnknownRates:
         Blocks without unknowns are left out. Rates of later blocks do not stand in it.
         """
         count = self.equations.z.numel()
-        rate, own = (self._first, y1) if y2 is None else (ca.substitute(self._second, self._y1, y1), y2)
+        rate, y_rate = (self._first, y1) if y2 is None else (ca.substitute(self._second, self._y1, y1), y2)
         symbol = self._y1 if y2 is None else self._y2
-        found = []
+        right_sides = []
         for block in self.equations.blocks:
             if slice_length(block.unknowns):
-                known = ca.vertcat(own[: block.unknowns.start], ca.SX.zeros(count - block.unknowns.start), own[count:])
-                found.append(ca.substitute(rate[block.rows], symbol, known))
-        return found
+                first = block.unknowns.start
+                known = ca.vertcat(y_rate[:first], ca.SX.zeros(count - first), y_rate[count:])
+                right_sides.append(ca.substitute(rate[block.rows], symbol, known))
+        return right_sides
 
     def first(self, u1: ca.SX) -> ca.SX:
         """The first rates of the unknowns (unknowns,) for those of the inputs (inputs,)."""

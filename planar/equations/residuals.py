@@ -54,42 +54,43 @@ def split_pair_numbers(pairs: Iterable[Pair], p: ca.SX | Sequence[Scalar]) -> di
 
 
 def pair_arguments(
-    pair: Pair, frames: Frames, numbers: PairValues, own: PairValues
+    pair: Pair, frames: Frames, numbers: PairValues, own_values: PairValues
 ) -> tuple[list[Frame], Sequence[Scalar], Sequence[Scalar]]:
     """What a pair's formulas take; a relative motion that no pair stands for has neither numbers nor coordinates."""
-    return [frames[link] for link in pair.bodies], numbers.get(pair.name, ()), own.get(pair.name, ())
+    return [frames[link] for link in pair.bodies], numbers.get(pair.name, ()), own_values.get(pair.name, ())
 
 
 def pair_residuals(
-    pairs: Iterable[Pair], frames: Frames, numbers: PairValues, own: PairValues
+    pairs: Iterable[Pair], frames: Frames, numbers: PairValues, own_values: PairValues
 ) -> Iterator[tuple[ConstraintRow, Scalar]]:
     """The residual of every constraint of some pairs, with what it is: lengths in the unit of the frames, or rad."""
     for pair in pairs:
-        values = pair.residual(*pair_arguments(pair, frames, numbers, own))
+        values = pair.residual(*pair_arguments(pair, frames, numbers, own_values))
         for kind, value in zip(pair.residual_kinds, values, strict=True):
             yield ConstraintRow(pair.name, kind), value
 
 
-def input_positions(pairs: Iterable[Pair], frames: Frames, numbers: PairValues, own: PairValues) -> list[Scalar]:
+def input_positions(pairs: Iterable[Pair], frames: Frames, numbers: PairValues, own_values: PairValues) -> list[Scalar]:
     """The positions of relative motions (m or rad, as the frames are)."""
-    return [pair.input_position(*pair_arguments(pair, frames, numbers, own)) for pair in pairs]
+    return [pair.input_position(*pair_arguments(pair, frames, numbers, own_values)) for pair in pairs]
 
 
 def input_residuals(
-    pairs: Sequence[Pair], frames: Frames, numbers: PairValues, own: PairValues, u: Iterable[Scalar]
+    pairs: Sequence[Pair], frames: Frames, numbers: PairValues, own_values: PairValues, u: Iterable[Scalar]
 ) -> Iterator[tuple[ConstraintRow, Scalar]]:
     """The positions of relative motions less those that they are to have."""
-    for pair, position, wanted in zip(pairs, input_positions(pairs, frames, numbers, own), u, strict=True):
-        yield ConstraintRow(pair.name, pair.input_kind), position - wanted
+    for pair, position, target in zip(pairs, input_positions(pairs, frames, numbers, own_values), u, strict=True):
+        yield ConstraintRow(pair.name, pair.input_kind), position - target
 
 
 def residuals(
-    mechanism: Mechanism, frames: Frames, numbers: PairValues, own: PairValues, u: ca.SX | Sequence[Scalar]
+    mechanism: Mechanism, frames: Frames, numbers: PairValues, own_values: PairValues, u: ca.SX | Sequence[Scalar]
 ) -> Iterator[tuple[ConstraintRow, Scalar]]:
     """The residual of every constraint and every input of a mechanism; u are the positions of the inputs alone."""
     motions = relative_motions(mechanism)
-    yield from pair_residuals(mechanism.pairs, frames, numbers, own)
-    yield from input_residuals([motions[given.pair] for given in mechanism.inputs], frames, numbers, own, scalars(u))
+    yield from pair_residuals(mechanism.pairs, frames, numbers, own_values)
+    driven = [motions[motion.pair] for motion in mechanism.inputs]
+    yield from input_residuals(driven, frames, numbers, own_values, scalars(u))
 
 
 def closing_error(residual: Scalar, kind: MeasureKind) -> Scalar:

@@ -61,8 +61,8 @@ class SparsePattern:
         key = rows.start, rows.stop, columns.start, columns.stop
         if key not in self._blocks:
             entries = np.arange(self.first[columns.start], self.first[columns.stop])
-            own = self.rows[entries]
-            entries = entries[(own >= rows.start) & (own < rows.stop)]
+            entry_rows = self.rows[entries]
+            entries = entries[(entry_rows >= rows.start) & (entry_rows < rows.stop)]
             width = columns.stop - columns.start
             places = (self.rows[entries] - rows.start) * width + self.columns[entries] - columns.start
             self._blocks[key] = entries, places
@@ -112,7 +112,7 @@ class SparseMatrices:
         """Some of the matrices, or a block of rows and columns of all (..., rows, columns) as an array."""
         if isinstance(key, tuple) and len(key) > 1 and isinstance(key[-1], slice) and isinstance(key[-2], slice):
             both = zip(key[-2:], self.pattern.shape, strict=True)
-            rows, columns = (slice(*each.indices(many)[:2]) for each, many in both)
+            rows, columns = (slice(*part.indices(count)[:2]) for part, count in both)
             entries, places = self.pattern.block_entries(rows, columns)
             shape = rows.stop - rows.start, columns.stop - columns.start
             blocks = np.zeros((*self.values.shape[:-1], shape[0] * shape[1]))
@@ -170,7 +170,7 @@ class SparseMatrices:
     def greatest_singular_value_bound(self) -> float:
         """A number that no singular value of one matrix exceeds: the root of its greatest sums of columns and rows."""
         sizes = np.abs(self.values)
-        sums = (np.bincount(each, sizes).max(initial=0.0) for each in (self.pattern.columns, self.pattern.rows))
+        sums = (np.bincount(indices, sizes).max(initial=0.0) for indices in (self.pattern.columns, self.pattern.rows))
         return float(np.sqrt(np.prod([*sums])))
 
     def divide_columns(self, sizes: Array) -> SparseMatrices:
@@ -193,13 +193,13 @@ class SparseMatrices:
     def solve(self, right_sides: Array) -> Array:
         """matrices^-1 right sides (..., unknowns, k), each by a factorisation of its own; not numbers where one is
         singular."""
-        many = self.values.reshape(-1, self.values.shape[-1])
+        matrices = self.values.reshape(-1, self.values.shape[-1])
         right = np.broadcast_to(right_sides, (*self.values.shape[:-1], *right_sides.shape[-2:]))
-        solutions = np.full((len(many), *right.shape[-2:]), np.nan)
-        for out, values, own in zip(solutions, many, right.reshape(solutions.shape), strict=True):
+        solutions = np.full((len(matrices), *right.shape[-2:]), np.nan)
+        for out, values, right_side in zip(solutions, matrices, right.reshape(solutions.shape), strict=True):
             factors = factorised(self.pattern.matrix(values))
             if factors is not None:
-                out[:] = factors.solve(np.ascontiguousarray(own))
+                out[:] = factors.solve(np.ascontiguousarray(right_side))
         return solutions.reshape(right.shape)
 
 

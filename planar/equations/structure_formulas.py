@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
-from planar.equations.assembled_equations import AssembledEquations, AssembledJacobians
-from planar.equations.closed_form_assemblies import ArrayFunction
+from planar.equations.assembled_equations import AssembledEquations
+from planar.equations.placed_blocks import BlockCall
 from planar.equations.sparse_matrices import SparsePattern
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
@@ -29,44 +29,31 @@ from planar.foundation.recorded_formula import (
 )
 
 
-class RecordedEquations(NamedTuple):
-    """Equations as formulas of (z, u, p), one after the other."""
-
-    closing: RecordedFormula
-    "-> F (rows,), then the entries of dF/dy by the pattern"
-    coordinates: RecordedFormula
-    "-> w (coordinates,)"
-    pattern: SparsePattern
-    "where the entries of dF/dy stand"
-
-
-def record_equations(assembled: AssembledEquations) -> RecordedEquations:
-    """The equations as elements evaluate them."""
-    instructions, (z, u, p) = recorded_arguments(assembled.argument_counts)
+def _record_elements(assembled: AssembledEquations, counts: Sequence[int]) -> tuple[RecordedFormula, RecordedFormula]:
+    """The formulas (z, u, p) -> F (rows,), then the entries of dF/dy, and (z, u, p) -> w of elements."""
+    instructions, (z, u, p) = recorded_arguments(counts)
 
     def formula_of(values: Iterable[Scalar]) -> RecordedFormula:
         return formula_of_results(instructions, [number_of(value, instructions) for value in values])
 
     residuals, entries = assembled.residuals_and_jacobians(z[None], u[None], p)
     coordinates = assembled.coordinates(z[None], u[None], p)
-    return RecordedEquations(formula_of([*residuals[0], *entries[0]]), formula_of(coordinates[0]), assembled.pattern)
+    return formula_of([*residuals[0], *entries[0]]), formula_of(coordinates[0])
 
 
-def _derive_equations(e: ConstraintEquations) -> RecordedEquations:
-    """Those that no elements stand for: of the position of least misfit."""
+def _record_expressions(e: ConstraintEquations) -> tuple[RecordedFormula, RecordedFormula]:
+    """The same formulas of equations that no elements stand for: of least misfit, or with rank conditions."""
     import casadi as ca  # few structures have such equations
 
     from planar.equations.elimination import stack_expressions
     from planar.equations.generic_evaluation import recorded_function
 
-    sparsity = e.jacobian.sparsity()
-    entries = [e.jacobian.nz[k] for k in range(e.jacobian.nnz())]
-    pattern = SparsePattern(e.jacobian.shape, np.array(sparsity.row(), dtype=int), np.array(sparsity.colind()))
+    entries = stack_expressions(e.jacobian.nz[k] for k in range(e.jacobian.nnz()))
     closing, coordinates = (
         recorded_function(ca.Function("formula", [e.z, e.u, e.p], [ca.densify(values)]))
-        for values in (ca.vertcat(e.F, stack_expressions(entries)), e.w)
+        for values in (ca.vertcat(e.F, entries), e.w)
     )
-    return RecordedEquations(closing, coordinates, pattern)
+    return closing, coordinates
 
 
 class RoundingTerms(NamedTuple):
@@ -87,13 +74,19 @@ class StructureFormulas:
     """The equations of one structure as formulas; evaluated as by `AssembledEquations`."""
 
     def __init__(self, equations: ConstraintEquations):
-        assembled = equations.assembled
-        recorded = _derive_equations(equations) if assembled is None else record_equations(assembled)
-        self._closing, self._coordinates, self.pattern = recorded
+        assembled, self._counts = equations.assembled, equations.argument_counts
+        if assembled is not None:
+            self.pattern = assembled.pattern
+            self._closing, self._coordinates = _record_elements(assembled, self._counts)
+        else:
+            sparsity = equations.jacobian.sparsity()
+            rows, first = np.array(sparsity.row(), dtype=int), np.array(sparsity.colind())
+            self.pattern = SparsePattern(equations.jacobian.shape, rows, first)
+            self._closing, self._coordinates = _record_expressions(equations)
         self._rows, self._coordinate_count = len(equations.rows), len(equations.coordinates)
         self._y_count = self.pattern.shape[1]
-        self._counts = equations.argument_counts
         self.unknown_count = self._counts[0]
+        self._rate_functions: dict[tuple[str, int], FormulaFunction] = {}
 
     @property
     def recorded(self) -> StructureFormulas:
@@ -110,8 +103,7 @@ class StructureFormulas:
         return self._closing.part(slice(self._rows, None))
 
     @cached_property
-    def closing(self) -> FormulaFunction:
-        """(z, u, p) -> F (rows,), then the entries of dF/dy."""
+    def _closing_function(self) -> FormulaFunction:
         return FormulaFunction(self._closing, self._counts, ((1, len(self._closing.results)),))
 
     @cached_property
@@ -135,10 +127,10 @@ class StructureFormulas:
         """w (samples, coordinates) at z (samples, unknowns), u and p (numbers,) or alike."""
         return self.coordinate_function.evaluate_entries(len(z), z.T, u.T, p.T).T
 
-    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> AssembledJacobians:
+    def residuals_and_jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """F and the entries of dF/dy by the pattern at samples."""
-        values = self.closing.evaluate_entries(len(z), z.T, u.T, p.T).T
-        return AssembledJacobians(values[:, : self._rows], values[:, self._rows :])
+        values = self._closing_function.evaluate_entries(len(z), z.T, u.T, p.T).T
+        return values[:, : self._rows], values[:, self._rows :]
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> tuple[Array, Array, Array]:
         """F (samples, 3, rows) and w (samples, 3, coordinates) with their first and second rates, and the entries of
@@ -148,46 +140,34 @@ class StructureFormulas:
         both = values[:, :split].reshape(len(y), 3, -1)
         return both[..., : self._rows], both[..., self._rows :], values[:, split:]
 
-    def _rate_function(self, formula: RecordedFormula, order: int) -> FormulaFunction:
-        """(y, y1, ..., p) -> the time derivatives of that order of a formula's results, from y and as many rates."""
-        counts = *([self._y_count] * (order + 1)), self._counts[-1]
-        instructions, (*rates, p) = recorded_arguments(counts)
-        jets = formula.evaluate([*map(Jet, *rates), *p])
-        constant_part = 0.0 if order else 1.0
-        results = [jet.parts[order] if isinstance(jet, Jet) else constant_part * jet for jet in jets]
-        numbers = [number_of(result, instructions) for result in results]
-        return FormulaFunction(formula_of_results(instructions, numbers), counts, ((1, len(numbers)),))
-
-    @cached_property
-    def _third_residual_rates(self) -> FormulaFunction:
-        return self._rate_function(self._residuals, 3)
-
-    @cached_property
-    def _third_coordinate_rates(self) -> FormulaFunction:
-        return self._rate_function(self._coordinates, 3)
+    def _rates(self, name: str, formula: RecordedFormula, rates: Sequence[Array], p: Array) -> Array:
+        """The time derivatives (samples, results) of a formula's results, of the order of the last of the rates."""
+        order = len(rates) - 1
+        function = self._rate_functions.get((name, order))
+        if function is None:
+            counts = *([self._y_count] * (order + 1)), self._counts[-1]
+            instructions, (*rates_of_y, numbers) = recorded_arguments(counts)
+            jets = formula.evaluate([*map(Jet, *rates_of_y), *numbers])
+            constant_part = 0.0 if order else 1.0
+            parts = [jet.parts[order] if isinstance(jet, Jet) else constant_part * jet for jet in jets]
+            results = [number_of(part, instructions) for part in parts]
+            function = FormulaFunction(formula_of_results(instructions, results), counts, ((1, len(results)),))
+            self._rate_functions[name, order] = function
+        return function.evaluate_entries(len(rates[-1]), *(rate.T for rate in rates), p).T
 
     def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """The third time derivatives of F (samples, rows), from y and its first to third rates, of (samples, y)."""
-        return self._third_residual_rates.evaluate_entries(len(rates[0]), *(rate.T for rate in rates), p).T
+        return self._rates("F", self._residuals, rates, p)
 
     def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """The same of w (samples, coordinates)."""
-        return self._third_coordinate_rates.evaluate_entries(len(rates[0]), *(rate.T for rate in rates), p).T
-
-    @cached_property
-    def _entry_rates(self) -> dict[int, FormulaFunction]:
-        """The time derivatives of the entries of dF/dy by their order, as far as they were wanted."""
-        return {}
+        return self._rates("w", self._coordinates, rates, p)
 
     def jacobian_rate(self, rates: Sequence[Array], p: Array) -> Array:
         """The time derivative of dF/dy (samples, rows, y) of the order of the last rate, from y and its rates, of
         (samples, y), or y (y,) for all samples."""
-        order, samples = len(rates) - 1, len(rates[-1])
-        if order not in self._entry_rates:
-            self._entry_rates[order] = self._rate_function(self._entries, order)
-        jacobian: Array = np.zeros((samples, *self.pattern.shape))
-        entries = self._entry_rates[order].evaluate_entries(samples, *(rate.T for rate in rates), p)
-        jacobian[:, self.pattern.rows, self.pattern.columns] = entries.T
+        jacobian: Array = np.zeros((len(rates[-1]), *self.pattern.shape))
+        jacobian[:, self.pattern.rows, self.pattern.columns] = self._rates("dF/dy", self._entries, rates, p)
         return jacobian
 
     def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
@@ -223,12 +203,12 @@ class StructureFormulas:
                 term_sum[:, row] += np.abs(np.broadcast_to(result.parts[1], (len(y), len(p)))) @ np.abs(p)[:, None]
         return RoundingTerms(value, term_sum[..., 0], *slopes)
 
-    def block_call(self, block: Block) -> ArrayFunction:
-        """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its own unknowns (unknowns, rows)."""
+    def block_call(self, block: Block) -> BlockCall:
+        """The residuals of a block and the columns of its Jacobian, as `block_function` has them."""
         return self.block_function(block)
 
     def block_function(self, block: Block) -> FormulaFunction:
-        """The formula of `block_call`."""
+        """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its own unknowns (unknowns, rows)."""
         rows, unknowns = slice_length(block.rows), slice_length(block.unknowns)
         residuals = self._closing.results[block.rows]
         formula = self._with_dense_entries(self._closing, residuals, block.rows, block.unknowns)

@@ -15,8 +15,7 @@ import numpy as np
 from planar.equations.assembled_equations import AssembledEquations, Elimination
 from planar.equations.block_decomposition import BlockIndices, decompose_blocks
 from planar.equations.coordinates import FRAME_PARTS, Coordinate, consecutive_ranges
-from planar.equations.element_placement import ElementPlacement
-from planar.equations.elements import PlacedElement
+from planar.equations.elements import ElementPlacement, PlacedElement
 from planar.equations.elimination import (
     CoordinateSymbols,
     EarlierRows,
@@ -29,7 +28,7 @@ from planar.equations.elimination import (
     stack_expressions,
 )
 from planar.equations.residuals import ConstraintRow, wrapped_residual
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Mechanism, relative_motions
@@ -42,6 +41,8 @@ else:
 
 MIN_MOVING_SLOPE = 1e-12
 """An entry of a Jacobian at random places, unknowns of about one, that is greater than rounding."""
+HELD, UNRELATED = -1, -2
+"""Rows that are no derivatives of the sum of squares of misfits: that have to close beside it, and the rest."""
 
 
 class Block(NamedTuple):
@@ -170,7 +171,7 @@ class ConstraintEquations:
         return ca.Function("equations", [self.z, self.u, self.p], [self.F, self.w])
 
 
-class _EliminatedStructure(NamedTuple):
+class EliminatedStructure(NamedTuple):
     """A structure's constraints after elimination; `unknowns` are the coordinates that remain, `remaining_rows` the
     rows of all that close them."""
 
@@ -210,17 +211,10 @@ def _is_overdetermined(equations: ConstraintEquations) -> bool:
     return any(slice_length(block.rows) > slice_length(block.unknowns) for block in equations.blocks)
 
 
-class _ElementsOfStructure(NamedTuple):
-    """The elements of a structure with its coordinates, all rows, and how many numbers there are."""
-
-    elements: tuple[PlacedElement, ...]
-    coordinates: tuple[Coordinate, ...]
-    rows: tuple[ConstraintRow, ...]
-    number_count: int
-
-
-def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Sequence[Pair]) -> _ElementsOfStructure:
-    """The elements of all pairs, then those of the inputs."""
+def _place_elements(
+    mechanism: Mechanism, given_links: Sequence[str], driven: Sequence[Pair]
+) -> tuple[tuple[PlacedElement, ...], tuple[Coordinate, ...], tuple[ConstraintRow, ...], int]:
+    """The elements of pairs, then those of inputs; the coordinates, the rows, and how many numbers there are."""
     coordinates: list[Coordinate] = []
     frame_columns: dict[str, range] = {}
     for link in mechanism.links:
@@ -246,13 +240,13 @@ def _place_elements(mechanism: Mechanism, given_links: Sequence[str], driven: Se
     for motion in driven:
         elements.append(placement.input_position_of(motion, len(rows)))
         rows.append(ConstraintRow(motion.name, motion.input_kind))
-    return _ElementsOfStructure(tuple(elements), tuple(coordinates), tuple(rows), sum(number_counts.values()))
+    return tuple(elements), tuple(coordinates), tuple(rows), sum(number_counts.values())
 
 
-def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> _EliminatedStructure:
+def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> EliminatedStructure:
     """The constraints of a structure, shortened by the coordinates that enter them with constant factors."""
     motions = relative_motions(mechanism)
-    driven = [motions[given.pair] for given in mechanism.inputs]
+    driven = [motions[driven_input.pair] for driven_input in mechanism.inputs]
     input_kinds = (
         *(MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE) * len(given_links),
         *(motion.input_kind for motion in driven),
@@ -289,7 +283,7 @@ def _eliminate_structure(mechanism: Mechanism, given_links: tuple[str, ...]) -> 
         len(input_kinds),
         number_count,
     )
-    return _EliminatedStructure(
+    return EliminatedStructure(
         mechanism,
         coordinates,
         rows,
@@ -314,7 +308,7 @@ def _elimination_rows(elements: Sequence[PlacedElement]) -> list[EliminationRow]
     return lines
 
 
-def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquations:
+def _assembled_equations_of(structure: EliminatedStructure) -> ConstraintEquations:
     """The equations of a structure, their blocks found by numbers at random places.
 
     What cancels in a sum shows in numbers only: an entry of the Jacobian that vanishes at random places is none. Left
@@ -325,15 +319,13 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     assembled = AssembledEquations(
         elimination, structure.unknowns, structure.remaining_rows, [row.kind is MeasureKind.ANGLE for row in remaining]
     )
-    ends = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
-    z, u, p = np.split(generic_numbers(2, int(ends[-1])), ends[:2], axis=1)
+    stops = np.cumsum([unknown_count, elimination.input_count, elimination.number_count])
+    z, u, p = np.split(generic_numbers(2, int(stops[-1])), stops[:2], axis=1)
     with np.errstate(all="ignore"):
-        one, other = (abs(slopes[:, :unknown_count]) for slopes in assembled.derivatives(z, u, p))
         # what grew beyond all numbers, along a long train of wheels, is more than rounding
-        sizes = one + other
-        rows, columns = sizes.nonzero()
-        entries = np.asarray(sizes[rows, columns]).ravel()
-    moved = _moving_columns(sizes.shape[0], rows.tolist(), columns.tolist(), entries[None])
+        _, entries = assembled.residuals_and_jacobians(z, u, p)
+    pattern = assembled.pattern.first_columns(unknown_count)
+    moved = _moving_columns(len(remaining), pattern.rows, pattern.columns, entries[:, : len(pattern.rows)])
 
     def make_expressions() -> ConstraintExpressions:
         return _without_idle_unknowns(_expressions_of(structure, {}), moved)
@@ -352,7 +344,7 @@ def _assembled_equations_of(structure: _EliminatedStructure) -> ConstraintEquati
     return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
-def _expressions_of(structure: _EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
+def _expressions_of(structure: EliminatedStructure, misfits: Mapping[int, ca.SX]) -> ConstraintExpressions:
     """F and w as expressions, in the order in which elimination leaves them; some rows stay open by their misfits."""
     return expressions_of_elimination(
         structure.elimination,
@@ -422,7 +414,7 @@ def _without_idle_unknowns(expressions: ConstraintExpressions, moved: Sequence[s
     return ConstraintExpressions(z, u, p, both[row_count:], both[:row_count])
 
 
-def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
+def _least_misfit_equations_of(structure: EliminatedStructure, open_rows: Sequence[int]) -> ConstraintEquations:
     """The equations of the position of least misfit, in which some rows of pairs may stay open."""
     misfits = {row: ca.SX.sym(f"misfit {row}") for row in open_rows}
     equations = _with_least_misfit(structure, _expressions_of(structure, misfits), misfits)
@@ -437,33 +429,75 @@ def _least_misfit_equations_of(structure: _EliminatedStructure, open_rows: Seque
     return _split_into_blocks(structure, equations, moved, coordinate_levels)
 
 
-def _with_least_misfit(
-    structure: _EliminatedStructure, expressions: ConstraintExpressions, misfits: Mapping[int, ca.SX]
-) -> ConstraintEquations:
-    """Equations whose rows may stay open by their misfits, made those of the position of least misfit."""
-    from planar.equations.misfits.least_misfit import HELD, UNRELATED, least_misfit_equations  # few pairs may stay open
+def _slope_of_squares(
+    values: ca.SX, weights: ca.SX, unknowns: ca.SX, multipliers: Sequence[ca.SX], closing: Sequence[ca.SX]
+) -> ca.SX:
+    """The derivatives of the weighed sum of squares of misfits by unknowns, of which the last are the multipliers of
+    rows that have to close: by these, the rows.
 
+    The sum is least where all of them vanish (C. F. Gauss, Theoria combinationis 1823); a row that has to close, as an
+    input's, has a multiplier (J.-L. Lagrange). Angles count as arcs at the mechanism's size.
+    """
+    # J^T W r by itself: the derivative of a sum of squares would take the squares first
+    slope = ca.jtimes(values, unknowns, weights * values, True)
+    if not multipliers:
+        return slope
+    residuals = stack_expressions(closing)
+    slope += ca.jtimes(residuals, unknowns, stack_expressions(multipliers), True)
+    return ca.vertcat(slope[: -len(multipliers)], residuals)
+
+
+def _with_least_misfit(
+    structure: EliminatedStructure, expressions: ConstraintExpressions, misfits: Mapping[int, ca.SX]
+) -> ConstraintEquations:
+    """Equations whose rows may stay open by their misfits, made those of the position of least misfit.
+
+    An eliminated row leaves its misfit, which is an unknown; one that remains has for a misfit its residual.
+
+    F first has the derivatives by the unknowns that misfits move, by the misfits of rows that were eliminated, and of
+    multipliers the rows that are held; then the rows that are unrelated to misfits. w has the misfits of all rows and
+    the multipliers behind it, p what the squares count.
+    """
     z, u, p, w, F = expressions
-    rows, remaining_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
+    rows, last_rows, unknowns = structure.rows, structure.remaining_rows, structure.unknowns
+    remaining = [misfits[row] for row in last_rows if row in misfits]
+    if remaining:
+        F, w = ca.substitute([F, w], [stack_expressions(remaining)], [ca.SX.zeros(len(remaining))])
     loose = {column for group in structure.groups if misfits.keys() & set(group.rows) for column in group.columns}
     tied = [k for k, column in enumerate(unknowns) if column in loose]
-    system = least_misfit_equations(ca.vertcat(F, w), z, remaining_rows, misfits, tied)
+    untied = [k for k in range(len(unknowns)) if k not in {*tied}]
+    touched = expression_unknowns(F, z)
+    # a row that must close is held where it rests on unknowns that the misfits move, and on these alone
+    closing = [k for k, row in enumerate(last_rows) if row not in misfits]
+    closing_rows = [k for k in closing if touched[k] and touched[k] <= {*tied}]
+    unrelated = [k for k in closing if k not in closing_rows]
+    residual_of = {row: F[k] for k, row in enumerate(last_rows)}
+    free = [row for row in misfits if row not in residual_of]
+    multipliers = [ca.SX.sym(f"multiplier {k}") for k in closing_rows]
+    weights = stack_expressions(ca.SX.sym(f"weight {row}") for row in misfits)
+    values = stack_expressions(residual_of.get(row, symbol) for row, symbol in misfits.items())
+    moved = stack_expressions([*(z[k] for k in tied), *(misfits[row] for row in free), *multipliers])
+    slope = _slope_of_squares(values, weights, moved, multipliers, [F[k] for k in closing_rows])
     first = len(structure.coordinates)
     added = [Coordinate(rows[row].pair, f"misfit {row}", rows[row].kind, False) for row in misfits]
-    added += [Coordinate(rows[remaining_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in system.held]
+    added += [Coordinate(rows[last_rows[k]].pair, "multiplier", MeasureKind.LENGTH, False) for k in closing_rows]
     column_of = {row: first + k for k, row in enumerate(misfits)}
-    names = [rows[row].pair for row in remaining_rows if row in misfits] or [rows[row].pair for row in misfits]
+    names = [rows[row].pair for row in last_rows if row in misfits] or [rows[row].pair for row in misfits]
     labels = [ConstraintRow(names[k % len(names)], MeasureKind.ANGLE) for k in range(len(tied))]
-    labels += [rows[row] for row in system.free]
-    labels += [rows[remaining_rows[k]] for k in (*system.held, *system.unrelated)]
-    untied = [k for k in range(len(unknowns)) if k not in {*tied}]
-    variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in system.free)]
-    multipliers = range(first + len(misfits), first + len(added))
-    all_unknowns = ca.vertcat(system.unknowns, *(z[k] for k in untied))
-    with_misfits = ConstraintExpressions(all_unknowns, u, ca.vertcat(p, system.weights), system.w, system.F)
+    labels += [rows[row] for row in free]
+    labels += [rows[last_rows[k]] for k in (*closing_rows, *unrelated)]
+    variables = [*(unknowns[k] for k in tied), *(column_of[row] for row in free)]
+    multiplier_columns = range(first + len(misfits), first + len(added))
+    with_misfits = ConstraintExpressions(
+        ca.vertcat(moved, *(z[k] for k in untied)),
+        u,
+        ca.vertcat(p, weights),
+        ca.vertcat(w, values, *multipliers),
+        ca.vertcat(slope, *(F[k] for k in unrelated)),
+    )
     return ConstraintEquations(
         coordinates=(*structure.coordinates, *added),
-        unknowns=(*variables, *multipliers, *(unknowns[k] for k in untied)),
+        unknowns=(*variables, *multiplier_columns, *(unknowns[k] for k in untied)),
         rows=tuple(labels),
         blocks=(),
         known_after_block=(),
@@ -471,12 +505,12 @@ def _with_least_misfit(
         make_expressions=lambda: with_misfits,
         open_rows=tuple(misfits),
         misfit_columns=tuple(column_of.values()),
-        row_variables=(*variables, *([HELD] * len(system.held)), *([UNRELATED] * len(system.unrelated))),
+        row_variables=(*variables, *([HELD] * len(closing_rows)), *([UNRELATED] * len(unrelated))),
     )
 
 
 def _split_into_blocks(
-    structure: _EliminatedStructure,
+    structure: EliminatedStructure,
     equations: ConstraintEquations,
     moved: Sequence[set[int]],
     coordinate_levels: Callable[[Mapping[int, int]], tuple[int, ...]],
@@ -536,34 +570,16 @@ def _moving_unknowns(expressions: ConstraintExpressions) -> list[set[int]]:
     z, u, p, w, F = expressions
     jacobian = ca.jacobian(ca.vertcat(F, w), z)
     slope = ca.Function("slope", [z, u, p], [jacobian])
-    ends = np.cumsum([symbol.numel() for symbol in (z, u, p)])
-    slopes = [slope(*np.split(numbers, ends[:2])).nonzeros() for numbers in generic_numbers(2, ends[2])]
-    return _moving_columns(jacobian.size1(), *jacobian.sparsity().get_triplet(), np.array(slopes))
+    stops = np.cumsum([symbol.numel() for symbol in (z, u, p)])
+    slopes = [slope(*np.split(numbers, stops[:2])).nonzeros() for numbers in generic_numbers(2, stops[2])]
+    rows, columns = np.array(jacobian.sparsity().get_triplet(), dtype=int)
+    return _moving_columns(jacobian.size1(), rows, columns, np.array(slopes))
 
 
-def _moving_columns(row_count: int, rows: Sequence[int], columns: Sequence[int], entries: Array) -> list[set[int]]:
+def _moving_columns(row_count: int, rows: IntArray, columns: IntArray, entries: Array) -> list[set[int]]:
     """For every row the columns whose entries (places, entries) are more than rounding at random places."""
     moving: list[set[int]] = [set() for _ in range(row_count)]
     is_moving = ~(np.abs(entries).sum(axis=0) <= MIN_MOVING_SLOPE)
-    for row, column, is_one in zip(rows, columns, is_moving.tolist(), strict=True):
-        if is_one:
-            moving[row].add(column)
+    for row, column in zip(rows[is_moving].tolist(), columns[is_moving].tolist(), strict=True):
+        moving[row].add(column)
     return moving
-
-
-def is_piecewise_in(expression: ca.SX, symbols: ca.SX) -> bool:
-    """Whether an expression changes its formula as these symbols change."""
-    others = [each for each in ca.symvar(expression) if not ca.depends_on(symbols, each)]
-    function = ca.Function("pieces", [symbols, ca.vertcat(ca.SX(0, 1), *others)], [expression])
-    depends: dict[int, bool] = {}
-    for k in range(function.n_instructions()):
-        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        if code == ca.OP_INPUT:
-            depends[out[0]] = of[0] == 0
-        elif code == ca.OP_CONST:
-            depends[out[0]] = False
-        elif code != ca.OP_OUTPUT:
-            depends[out[0]] = any(depends[each] for each in of)
-            if depends[out[0]] and code in (ca.OP_FLOOR, ca.OP_LT, ca.OP_LE):
-                return True
-    return False

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges, frames_from_coordinates
-from planar.equations.element_groups import ElementGroup, group_elements, pattern_of_groups
-from planar.equations.element_placement import ElementPlacement
+from planar.equations.elements import ElementGroup, ElementPlacement, group_elements, pattern_of_groups
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern

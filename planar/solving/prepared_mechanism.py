@@ -148,7 +148,7 @@ class PreparedMechanism:
     def is_least_misfit(self, z: Array, u: Array) -> Array:
         """At which stationary positions (samples,) the misfit is the least of all beside: whether its second derivative
         is positive along all moves that keep what has to close."""
-        from planar.equations.misfits.least_misfit import HELD  # few pairs may stay open
+        from planar.equations.symbolic_equations import HELD  # few pairs may stay open
 
         e = self.equations
         slopes = self.functions.jacobians(z, u, self.inputs.p)[0]

@@ -13,7 +13,9 @@ from planar.batch.march.runs import LANES, KernelRequest, designs_kernel
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile, printed_formula
 from planar.codegen.instructions import MAX_INSTRUCTIONS, CosSin, expand_angle_sums
-from planar.codegen.llvm_compile import allocate_aligned
+from planar.codegen.llvm_compile import allocate_aligned, compile_function
+from planar.codegen.llvm_ir import IRWriter
+from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
@@ -374,3 +376,30 @@ def test_many_loads_are_of_groups_and_each_is_where_it_belongs():
     rows, out = np.random.default_rng(0).integers(-9, 9, (many, 16)).astype(float), np.empty(16)
     total(rows.ctypes.data, out.ctypes.data)
     np.testing.assert_array_equal(out, np.arange(1.0, many + 1.0) @ rows)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_linear_systems_in_loops_are_solved_lane_by_lane(count):
+    lanes = 4
+    t = IRWriter(lanes)
+    t.write_line("define void @solve(ptr %matrix, ptr %right, ptr %to) {")
+    t.write_label("entry")
+    systems = LinearSystems(t, count)
+    columns = [t.load(t.double_pointer("%matrix", str(lanes * k))) for k in range(count * count)]
+    least = systems.factorise(columns, count)
+    right = [t.load(t.double_pointer("%right", str(lanes * k))) for k in range(count)]
+    for k, value in enumerate([*systems.solve(right), least]):
+        t.store(value, t.double_pointer("%to", str(lanes * k)))
+    t.write_line("ret void")
+    t.write_line("}")
+    t.write_line(systems.function_text)
+    solve = compile_function(t.module_text(), "solve", *["array"] * 3)
+    rng = np.random.default_rng(count)
+    matrix, right_side = rng.normal(size=(count, count, lanes)), rng.normal(size=(count, lanes))
+    result = np.empty((count + 1, lanes))
+    solve(matrix.ctypes.data, right_side.ctypes.data, result.ctypes.data)
+    for lane in range(lanes):
+        rows = matrix[:, :, lane].T
+        np.testing.assert_allclose(rows @ result[:count, lane], right_side[:, lane], rtol=1e-9, atol=1e-12)
+        ratios = np.diag(np.linalg.qr(rows)[1]) ** 2 / (rows**2).sum(axis=0)
+        assert result[count, lane] == pytest.approx(ratios.min(), rel=1e-9)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from planar.equations.acceptance import AcceptanceFunctions, InputSamples
+from planar.equations.block_motion import LargeBlockMotion
 from planar.equations.block_types import block_equations
 from planar.equations.functions import EquationFunctions
-from planar.equations.large_block_motion import LargeBlockMotion
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.jets import Jet
 from planar.model.pairs import pair_types
@@ -63,7 +63,7 @@ def test_what_is_open_and_rates_that_are_wrong_are_judged_as_the_general_check_j
     rng = np.random.default_rng(1)
     wrong = run.coordinate_rates + 1e-5 * rng.uniform(-1.0, 1.0, run.coordinate_rates.shape)
     motion = np.concatenate([wrong.transpose(1, 2, 0), np.array([part.T for part in given])], axis=1)
-    judgement = functions._check.judge(motion, solver.inputs.p)
+    residual, _, velocity_error, acceleration_error, _ = functions.check.judge(motion, solver.inputs.p)
     frames, own = lazy_frames(solver, list(wrong.transpose(1, 0, 2)))
     inputs = [Jet(*(part[:, k] * solver._input_scale[k] for part in given)) for k in range(given.u.shape[1])]
     open_now = solver.residual_check.residuals(
@@ -71,9 +71,9 @@ def test_what_is_open_and_rates_that_are_wrong_are_judged_as_the_general_check_j
         {name: [jet.parts[0] for jet in values] for name, values in own.items()},
         np.array([jet.parts[0] for jet in inputs]),
     )
-    np.testing.assert_allclose(judgement.residual, open_now.max(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(residual, open_now.max(axis=0), rtol=1e-6)
     errors = solver.residual_check.rate_residuals(frames, own, inputs)
-    for error, (gaps, _) in zip((judgement.velocity_error, judgement.acceleration_error), errors, strict=True):
+    for error, (gaps, _) in zip((velocity_error, acceleration_error), errors, strict=True):
         np.testing.assert_allclose(error, gaps, rtol=1e-6)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import planar
 from planar.equations.acceptance import InputSamples
-from planar.equations.block_regularity import reduce_to_triangle, regularity_bound
+from planar.equations.block_motion import reduce_to_triangle, regularity_bound
 from planar.solving.position import PositionSolver
 
 

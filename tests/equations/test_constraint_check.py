@@ -6,7 +6,6 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.equations import constraint_check
-from planar.equations.constraint_check import ConstraintCheck
 from planar.equations.coordinates import FRAME_PARTS
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.equations.residuals import closing_error, residuals
@@ -39,7 +38,7 @@ def assert_equal_to_single_pairs(mechanism, orders, samples=SAMPLES):
         for pair in pairs[: len(mechanism.pairs)]
     }
     u = values[len(entries) :]
-    evaluated = ConstraintCheck(mechanism, column).evaluate(motion, p)
+    evaluated = constraint_check.constraint_check(mechanism, len(entries)).evaluate(motion, p)
     for k, (row, value) in enumerate(residuals(mechanism, frames, numbers, own, u)):
         parts = list(value_and_rates(value)[:orders])
         parts[0] = closing_error(parts[0], row.kind)
@@ -79,9 +78,5 @@ def test_pairs_that_exceed_the_largest_array_are_computed_in_parts(monkeypatch):
 def test_equal_pairs_are_computed_by_one_formula():
     """Pins of a row: between the frame and a link, and between two links; the input is the third formula."""
     mechanism = planar.from_dict(chain.document(20))
-    groups = constraint_check._make_groups(
-        mechanism.pairs,
-        tuple(relative_motions(mechanism)[given.pair] for given in mechanism.inputs),
-        tuple(link.name for link in mechanism.links if link.name != mechanism.frame),
-    )
+    groups = constraint_check.constraint_check(mechanism, 57).groups
     assert sorted(len(group.names) for group in groups) == [1, 10, 18]

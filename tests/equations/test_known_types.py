@@ -4,7 +4,7 @@ import casadi
 import pytest
 
 import planar
-from planar.equations import block_type_functions, known_types
+from planar.equations import block_type_functions, elements
 from planar.equations.block_type_functions import BlockTypeFormulas, derive_block_type
 from planar.equations.elements import Element
 from planar.equations.functions import EquationFunctions
@@ -18,11 +18,11 @@ from tests.linkages import random_linkage
 
 def test_the_file_is_what_is_derived_of_all_models():
     """`python -m tests.known_types` makes it."""
-    assert known_lines() == known_types.KNOWN_TYPES_FILE.read_text(encoding="utf-8")
+    assert known_lines() == elements.KNOWN_TYPES_FILE.read_text(encoding="utf-8")
 
 
 def test_texts_give_back_what_they_were_made_of(monkeypatch):
-    monkeypatch.setattr(known_types, "known_text", lambda _: None)
+    monkeypatch.setattr(elements, "known_text", lambda _: None)
     equations = build_equations(equation_structure(planar.from_dict(lift_document(1))))
     for placed in equations.elimination.elements:
         element = placed.element

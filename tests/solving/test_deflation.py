@@ -3,13 +3,14 @@
 from itertools import permutations
 from math import cos, factorial, pi, prod, sin, sqrt
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import planar
 from planar.analysis.identity.mobility import mobility
 from planar.analysis.worked.solution import worked_solution
-from planar.equations.rank_conditions import constraint_dependencies, determinant_rates
+from planar.equations.rank_conditions import constraint_dependencies, determinant_rates, symbolic_determinant
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.position import solved_mechanism
@@ -264,6 +265,18 @@ def test_the_command_tells_its_mobility(tmp_path):
     told = " ".join(run(tmp_path, "solve", "jaw.json").done().split())
     assert "mobility 1" in told
     assert TO_SECOND_ORDER in told
+
+
+@pytest.mark.parametrize("size", [1, 2, 4, 6])
+def test_determinants_without_division_are_those_of_numpy(size):
+    matrices = np.random.default_rng(0).normal(size=(3, size, size)) * np.array([1.0, 5.0, 30.0])[:, None, None]
+    entries = ca.SX.sym("entries", size, size)
+    determinant = ca.Function("determinant", [entries], [symbolic_determinant(entries)])
+    for matrix in matrices:
+        assert float(determinant(matrix)) == pytest.approx(np.linalg.det(matrix), rel=1e-9)
+    singular = matrices[0]
+    singular[-1] = singular[: size - 1].sum(axis=0)
+    assert float(determinant(singular)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_rates_of_determinants_are_those_of_their_polynomials():

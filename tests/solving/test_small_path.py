@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.equations import acceptance, block_motion, block_type_functions
+from planar.equations import acceptance, block_type_functions, rates
 from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
 from planar.model.mechanism import Drive, replace_inputs
@@ -114,8 +114,8 @@ def test_wrong_rates_of_a_block_type_do_not_pass(order, monkeypatch):
     solver = PositionSolver(mechanism())
     z = solver.find_assembly().z
     assert fast_position(solver, z) is not None
-    real = getattr(block_motion.UnknownRates, order)
-    monkeypatch.setattr(block_motion.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
+    real = getattr(rates.UnknownRates, order)
+    monkeypatch.setattr(rates.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
     monkeypatch.setattr(block_type_functions, "known_text", lambda _: None)
     monkeypatch.setattr(acceptance, "block_type_functions", block_type_functions.BlockTypeFunctions)
     wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, EquationFunctions(solver.equations))

@@ -17,8 +17,7 @@ import numpy as np
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.prediction import LEAST_START_REGULARITY
 from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
-from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
-from planar.codegen.invariant_hoisting import InvariantHoister
+from planar.codegen.instructions import CosSin, InvariantHoister, check_length, expand_angle_sums
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions

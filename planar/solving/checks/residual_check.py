@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planar.equations.constraint_check import ORDERS, ConstraintCheck
-from planar.equations.coordinates import FRAME_PARTS
+from planar.equations.constraint_check import ORDERS, ConstraintCheck, constraint_check
 from planar.equations.mechanism_numbers import pair_numbers_from
 from planar.equations.residuals import Frames, PairValues
 from planar.foundation.arrays import Array
@@ -88,10 +87,9 @@ class ResidualCheck:
 
     @cached_property
     def _check(self) -> ConstraintCheck:
-        moving = [link.name for link in self.mechanism.links if link.name != self.mechanism.frame]
-        entries = [(link, part) for link in moving for part in FRAME_PARTS]
-        entries += [(pair.name, part) for pair in self.mechanism.pairs for part, _ in pair.coordinate_kinds]
-        return ConstraintCheck(self.mechanism, {entry: k for k, entry in enumerate(entries)})
+        own_count = sum(len(pair.coordinate_kinds) for pair in self.mechanism.pairs)
+        moving_count = sum(link.name != self.mechanism.frame for link in self.mechanism.links)
+        return constraint_check(self.mechanism, 3 * moving_count + own_count)
 
     def _motion(self, frames: Frames, own: PairValues, inputs: Sequence[Scalar] | Array, orders: int) -> Array:
         """Links, pairs and inputs, values and rates up to `orders` (orders, entries, samples), lengths in sizes."""
