@@ -39,8 +39,9 @@ class ClosedForm(NamedTuple):
     `values`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
     or -1, which of the two assemblies; `sign_expression`: in all unknowns, has this sign; `coalescence`: 0 to 1, where
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
-    `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None.
-    `squared_lengths` (2,): of the Jacobian's columns.
+    `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None. `cosine`:
+    that cosine itself, which changes sign between the two dead points and so varies as slowly as what holds the block;
+    None where an arm changes. `squared_lengths` (2,): of the Jacobian's columns.
     """
 
     values: tuple[tuple[ca.SX, ...], ...]
@@ -49,6 +50,7 @@ class ClosedForm(NamedTuple):
     coalescence: ca.SX
     squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
+    cosine: ca.SX | None = None
 
 
 class _ComplexNumber(NamedTuple):
@@ -100,11 +102,12 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
         return None
     function, part_counts, has_arm = derived
     sign = ca.SX.sym("sign")
-    *results, lengths, arm = function(unknowns, others, sign)
+    *results, lengths, arm, cosine = function(unknowns, others, sign)
     parts = iter(results)
     values = tuple(tuple(next(parts) for _ in range(count)) for count in part_counts)
     side, coalescence = parts
-    return ClosedForm(values, sign, side, coalescence, lengths, arm if has_arm else None)
+    changing = (arm, None) if has_arm else (None, cosine)
+    return ClosedForm(values, sign, side, coalescence, lengths, *changing)
 
 
 def closed_form_formula(e: ConstraintEquations, block: Block) -> tuple[RecordedFormula | None, bool]:
@@ -136,9 +139,9 @@ def _derive_form(formula: str, angles: tuple[bool, ...]) -> tuple[ca.Function, t
     if form is None:
         return None
     values = form.values[::-1] if first else form.values
-    arm = ca.SX(0.0) if form.squared_arm is None else form.squared_arm
+    arm, cosine = (ca.SX(0.0) if part is None else part for part in (form.squared_arm, form.cosine))
     results = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
-    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm)]
+    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm, cosine)]
     part_counts = tuple(len(value) for value in values)
     derived = ca.Function("form", [both, others, form.sign], outputs)
     return derived, part_counts, form.squared_arm is not None
@@ -168,7 +171,8 @@ def _solve_two_angles(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
     side = a.multiply(_unit_number(one)).cross(b.multiply(_unit_number(two)))
     coalescence = 1.0 - area / (4.0 * a.squared_length * b.squared_length)
     lengths = ca.vertcat(a.squared_length, b.squared_length)
-    return ClosedForm((tuple(e1), tuple(e2)), sign, side, coalescence, lengths)
+    cosine = (d.squared_length - a.squared_length - b.squared_length) / (2.0 * one_length * other_length)
+    return ClosedForm((tuple(e1), tuple(e2)), sign, side, coalescence, lengths, None, cosine)
 
 
 def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | None:
@@ -203,9 +207,9 @@ def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | 
         unit = (-(g + direction.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
-    squared_arm = None if direction is fixed else g.squared_length
+    changing = (None, gap / ca.sqrt(spanned)) if direction is fixed else (g.squared_length, None)
     lengths = ca.vertcat(reach.squared_length, direction.squared_length)
-    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, squared_arm)
+    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, *changing)
 
 
 def _cos_sin_coefficients(rows: ca.SX, angle: ca.SX) -> tuple[ca.SX, ca.SX]:

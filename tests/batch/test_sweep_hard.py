@@ -211,3 +211,25 @@ def test_newton_does_not_turn_a_link_on_an_arm_that_vanishes(monkeypatch):
     mechanism, lengths = planar.from_dict(value), {"OA.length": np.full(2, 1.0)}
     agrees(mechanism, lengths, 20, points="E", start=0.5, stop=-0.5)
     assert planar.sweep(mechanism, lengths, 20, points="E", start=0.5, stop=-0.5).general > 0
+
+
+@pytest.mark.parametrize("steps", [13, 24])
+def test_a_gap_between_two_steps_is_not_passed_over(steps):
+    """A short coupler and rocker under a long crank may close again within the step in which they come to a dead
+    point."""
+    rng, count = np.random.default_rng(steps), 40_000
+    a, g = rng.uniform(0.6, 1.4, (2, count))
+    b, c = rng.uniform(0.05, 0.5, (2, count))
+    start = rng.uniform(0.0, 2.0 * np.pi, count)
+    closes = np.abs(b * b + c * c - (a * a + g * g - 2.0 * a * g * np.cos(start))) < 1.9 * b * c
+    a, g, b, c, start = (values[closes] for values in (a, g, b, c, start))
+    with np.errstate(invalid="ignore"):
+        angles = [np.arccos((a * a + g * g - reach**2) / (2.0 * a * g)) for reach in (b + c, np.abs(b - c))]
+    turned = np.remainder(np.concatenate([angles, np.negative(angles)]) - start, 2.0 * np.pi)
+    turned = np.sort(np.where(np.isnan(turned), np.inf, turned), axis=0)
+    assert np.count_nonzero(turned[1] - turned[0] < 2.0 * np.pi / steps) > 300
+    values = {"crank.length": a, "coupler.length": b, "rocker.length": c, "frame.D.x": g, "A.position": start}
+    swept = planar.sweep(bare_four_bar(1.2, 0.3, 0.25, 1.2, 0.2), values, steps, "C", rates=False)
+    np.testing.assert_allclose(np.nan_to_num(swept.dead_point - start, nan=np.inf), turned[0], atol=1e-8)
+    solved = np.minimum(np.ceil(turned[0] / (2.0 * np.pi / steps)), steps + 1).astype(int)
+    assert (np.asarray(swept.status) == 0).sum(axis=1).tolist() == solved.tolist()

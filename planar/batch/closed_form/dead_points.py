@@ -92,8 +92,16 @@ def search_dead_points(
         intervals = float(np.fmax.reduce((span - reached) / longest, initial=0.0))
     most = np.array([MOST_WITHOUT_INTERVALS + 2.0 * intervals])
     rows = (batch.numbers, operand_rows(equations.input_operands, batch.u0), signs, np.stack(ranges))
-    distance, block = call_with_designs(_write_search(equations, index), SEARCH_NAME, rows, most, 2)
-    return DeadPoints(np.where(span > 0.0, distance, np.nan), block.astype(int))
+    distance, number = call_with_designs(_write_search(equations, index), SEARCH_NAME, rows, most, 2)
+    owners = np.array([*watched_blocks(equations), -1])  # the last one of none
+    return DeadPoints(np.where(span > 0.0, distance, np.nan), owners[number.astype(int)])
+
+
+def watched_blocks(equations: KernelEquations) -> list[int]:
+    """The blocks, and behind them the pairs with stops, whose values the search watches; of a block with a cosine there
+    are two, how far that is from one and from minus one."""
+    counts = [1 if form.cosine is None else 2 for form in equations.closed_forms] + [1] * len(equations.stop_pairs)
+    return [k for k, count in enumerate(counts) for _ in range(count)]
 
 
 class DeadPointWriter(BlockJoinWriter):
@@ -103,7 +111,7 @@ class DeadPointWriter(BlockJoinWriter):
     def __init__(self, equations: KernelEquations, index: int):
         super().__init__(equations, (), None)
         self.index = index
-        self.watched = range(len(equations.blocks) + len(equations.stop_pairs))
+        self.watched = range(len(watched_blocks(equations)))
         known = ((k, n) for k in self.watched for n in range(PLACES))
         self.slot_names: tuple[Slot, ...] = (*INTERVAL_SLOTS, *BRACKET_SLOTS, *known)
         self.slots = {name: ca.SX.sym(str(name)) for name in self.slot_names}
@@ -143,8 +151,8 @@ class DeadPointWriter(BlockJoinWriter):
         return self.close_function("block")
 
     def _write_evaluation(self, start: OperandNames, sense: str) -> list[str]:
-        """How far every block's coalescence is from one where the lanes look, no number where an arm is short; then how
-        far what reaches one where a pair meets its stop."""
+        """How far, where the lanes look, every block's cosine is from one and from minus one, or its coalescence from
+        one, no number where an arm is short; then how far what reaches one where a pair meets its stop."""
         t, values = self.ir, list[str]()
         offset = t.binary("mul", sense, t.load(self.pointers["place"]))
         names = start | {("u", self.index): t.binary("add", start["u", self.index], offset)}
@@ -153,13 +161,14 @@ class DeadPointWriter(BlockJoinWriter):
         for part in self.equations.blocks:
             form = part.closed_form
             assert form is not None
-            self.write_closed_form(part, names)
-            (near,) = self.write_values([form.coalescence], names)
-            value = t.binary("sub", t.constant(1.0), near)
-            if form.squared_arm is not None:
-                (arm,) = self.write_values([form.squared_arm], names)
-                value = t.select(t.compare("olt", arm, t.constant(LEAST_ARM**2)), t.constant(nan), value)
-            values.append(value)
+            near = self.write_closed_form(part, names, as_cosine=True)
+            if form.cosine is not None:
+                values += [t.binary(operation, t.constant(1.0), near) for operation in ("sub", "add")]
+                continue
+            assert form.squared_arm is not None
+            near, arm = self.write_values([form.coalescence, form.squared_arm], names)
+            is_short = t.compare("olt", arm, t.constant(LEAST_ARM**2))
+            values.append(t.select(is_short, t.constant(nan), t.binary("sub", t.constant(1.0), near)))
         return [*values, *(t.binary("sub", t.constant(1.0), stop) for stop in self.write_stops(names))]
 
     def _write_changes(self, changes: list[tuple[ca.SX, Changes]], ranges: list[str], values: list[str]) -> None:

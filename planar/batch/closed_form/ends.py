@@ -47,7 +47,9 @@ class ClosedFormDesigns:
         batch, stops, sense = self.batch, self.batch.stops, np.sign(lengths)
         if stops is not None and stops.has_wide_ranges:
             batch = batch._replace(stops=stops.near_positions(self.stop_positions(sense * reached)))
-        ranges = (reached, np.abs(lengths), np.minimum(step, LONGEST_STEP), sense)
+        # links that carry other blocks may turn faster than the input
+        longest = SEARCH_STEP if self.joiner.equations.carrying_angles else LONGEST_STEP
+        ranges = (reached, np.abs(lengths), np.minimum(step, longest), sense)
         dead_points = search_dead_points(self.joiner.equations, self.index, batch, self.signs, ranges)
         if stops is None:
             return dead_points

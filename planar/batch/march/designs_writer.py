@@ -6,7 +6,7 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, nan
+from math import cos, inf, nan
 from typing import NamedTuple
 
 import casadi as ca
@@ -28,10 +28,12 @@ from planar.batch.march.kernel_writer import (
 from planar.batch.march.prediction import (
     LEAST_KERNEL_REGULARITY,
     LEAST_START_REGULARITY,
+    MAX_TURN_PER_STEP,
     PREDICTOR_ORDER,
     least_regularity,
 )
 from planar.codegen.llvm_linear import LinearSystems
+from planar.codegen.tape import LinkDirection, write_turn_flags
 from planar.equations.linear import solve_by_determinants
 from planar.foundation.instruction_list import UnsupportedOperation
 
@@ -120,6 +122,7 @@ class _DesignsKernelWriter(KernelWriter):
         }
         watched = (*self.equations.closed_forms, *self.equations.stop_pairs)
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in watched]
+        self.turn_slots = {k: (t.allocate(), t.allocate()) for k in self.equations.carrying_angles}
         self.regularity_slot, self.good_count_slot, self.candidate_count_slot = (t.allocate() for _ in range(3))
         self.passed_slot, self.candidate_slot = (t.allocate_flags() for _ in range(2))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
@@ -137,6 +140,7 @@ class _DesignsKernelWriter(KernelWriter):
             else:
                 flags += self._write_closed_form_block(part, have)
         flags += self._write_stops(have)
+        flags += self._write_turns(have)
         t.write_line("br label %told")
         t.write_label("told")
         self._write_step_end(have, flags)
@@ -187,6 +191,8 @@ class _DesignsKernelWriter(KernelWriter):
         t.store_flags("splat (i1 true)", self.candidate_slot)
         for each in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
             t.store("zeroinitializer", each)
+        for slot in (slot for both in self.turn_slots.values() for slot in both):
+            t.store(t.constant(nan), slot)
         t.write_line("br label %step")
         return have, at_start
 
@@ -224,16 +230,19 @@ class _DesignsKernelWriter(KernelWriter):
         """A block in closed form; flags that say where its two assemblies keep apart."""
         if self.request.point_blocks is not None:
             self._write_other_assembly(part, have)
-        bend = self.write_closed_form(part, have)
+        near = self.write_closed_form(part, have, as_cosine=True)
         for k in part.unknowns:
             if self.is_carried(("z", k)):
                 self._write_carried_angle(k, have)
         if self.request.counts_candidates:
-            self.apart_here.append(self.write_apart_here(part, bend, have))
-        return [self._write_keeps_below(bend, self.bend_slots[self.sign_index[part.block.block_index]])]
+            self.apart_here.append(self.write_apart_here(part, near, have))
+        assert part.closed_form is not None
+        slots = self.bend_slots[self.sign_index[part.block.block_index]]
+        return [self._write_keeps_below(near, slots, part.closed_form.cosine is not None)]
 
-    def _write_keeps_below(self, value: str, slots: Sequence[str]) -> str:
-        """A flag: what reaches one at a dead point or a stop keeps below it, between steps too.
+    def _write_keeps_below(self, value: str, slots: Sequence[str], is_cosine: bool = False) -> str:
+        """A flag: what reaches one at a dead point or a stop (a cosine: one or minus one) keeps below it, between steps
+        too.
 
         By as much as it bends over the last three steps. So it may be the step before at which it had come too near.
         """
@@ -241,7 +250,18 @@ class _DesignsKernelWriter(KernelWriter):
         before, earlier = (t.load(slot) for slot in slots)
         for slot, new in zip(slots, (value, before), strict=True):
             t.store(new, slot)
-        return write_keeps_apart(t, earlier, before, value, t.broadcast_counter_test("%k", "sgt", 1))
+        return write_keeps_apart(t, earlier, before, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
+
+    def _write_turns(self, have: OperandNames) -> list[str]:
+        """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,
+        steps do not show what these blocks do between them."""
+        t, flag = self.ir, "splat (i1 true)"
+        directions = [LinkDirection(have["zc", k], have["zs", k], None) for k in self.turn_slots]
+        slots = [slot for both in self.turn_slots.values() for slot in both]
+        flag = write_turn_flags(t, flag, directions, [t.load(slot) for slot in slots], cos(MAX_TURN_PER_STEP))
+        for slot, value in zip(slots, (part for direction in directions for part in direction[:2]), strict=True):
+            t.store(value, slot)
+        return [flag] if slots else []
 
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""
@@ -365,8 +385,8 @@ class _DesignsKernelWriter(KernelWriter):
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
-        """The step ends: its results are written, and judged."""
-        t, results = self.ir, self.results
+        """The step ends: its results are written, and judged; `flags` judge what lies before it."""
+        t, results, between_count = self.ir, self.results, len(flags)
         told = [] if results is not None else [each * self.symbols["scale"] for each in self.output_expressions()]
         self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
@@ -391,7 +411,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("br label %stepend")
         t.write_label("judged")
         if self.request.counts_candidates:
-            here = [*self.apart_here, *flags[len(self.apart_here) :]]
+            here = [*self.apart_here, *flags[between_count:]]
             passed.append(self.write_passed(here, self.candidate_slot))
         if self.request.point_blocks is None:
             many = [t.select(passed[-1][1], each, t.constant(nan)) for each in many]

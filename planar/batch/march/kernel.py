@@ -117,6 +117,17 @@ class KernelEquations:
         )
         "what stands for the inputs"
 
+    @cached_property
+    def carrying_angles(self) -> tuple[int, ...]:
+        """The unknown angles on which blocks beside their own depend, by number."""
+        e = self.equations
+        rows, columns = ca.jacobian_sparsity(e.F, e.z).get_triplet()
+        own_rows = {
+            k: range(part.block.rows.start, part.block.rows.stop) for part in self.blocks for k in part.unknowns
+        }
+        carrying = {k for row, k in zip(rows, columns, strict=True) if self.is_angle[k] and row not in own_rows[k]}
+        return tuple(sorted(carrying))
+
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
         found: np.ndarray = np.sign(self._sides_function(z, u, p).full())
@@ -286,14 +297,15 @@ class KernelInstructions:
             for operand in ([("zc", k), ("zs", k)] if len(values) == 2 else [("z", k)])
         ]
 
-    def closed_form_outputs(self, part: KernelBlock) -> list[ca.SX]:
-        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet.
+    def closed_form_outputs(self, part: KernelBlock, as_cosine: bool = False) -> list[ca.SX]:
+        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet; the cosine
+        in place of its square where it is asked for, and no arm changes.
 
         An arm that shrinks to `LEAST_START_REGULARITY` counts as that too: what turns on it is not determined.
         """
         form = part.closed_form
         assert form is not None
-        near = form.coalescence
+        near = form.coalescence if form.cosine is None or not as_cosine else form.cosine
         if form.squared_arm is not None:
             near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
         return [*(value for values in form.values for value in values), near]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
+from math import sqrt
 from typing import NamedTuple
 
 import casadi as ca
@@ -102,9 +103,10 @@ class KernelWriter(KernelInstructions):
         self.ir.write_values(made, [k for k in order if k not in still], names, names)
         return [names[k] for k in wanted]
 
-    def write_closed_form(self, part: KernelBlock, names: OperandNames) -> str:
-        """A block in closed form: its unknowns put into `names`, and how near its two assemblies are."""
-        *values, coalescence = self.write_values(self.closed_form_outputs(part), names)
+    def write_closed_form(self, part: KernelBlock, names: OperandNames, as_cosine: bool = False) -> str:
+        """A block in closed form: its unknowns put into `names`, and how near its two assemblies are, see
+        `closed_form_outputs`."""
+        *values, coalescence = self.write_values(self.closed_form_outputs(part, as_cosine), names)
         names.update(zip(self.closed_form_operands(part), values, strict=True))
         return coalescence
 
@@ -136,8 +138,9 @@ class KernelWriter(KernelInstructions):
         scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
         return t.binary("mul", c, scale), t.binary("mul", s, scale)
 
-    def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
-        """A flag: the two assemblies of a block are apart enough for a position, whatever lies before it.
+    def write_apart_here(self, part: KernelBlock, near: str, names: OperandNames) -> str:
+        """A flag: the two assemblies of a block are apart enough for a position, by its cosine or coalescence `near`,
+        and independent of what lies before it.
 
         Where no arm changes by what of its digits is lost, else as far as everywhere, less by more than rounding: where
         assemblies keep apart between steps too, this flag is up.
@@ -150,7 +153,7 @@ class KernelWriter(KernelInstructions):
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
             least = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
             (most,) = self.write_values([1.0 - ca.fmin(greatest, least)], names)
-        return t.compare("ole", coalescence, most)
+        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), most)
 
     def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:
         """Two flags: all steps before passed, and this one by its own flags too, which is kept."""
@@ -203,21 +206,28 @@ def write_closes(t: IRWriter, residuals: Sequence[str], tolerance: str) -> str:
     return t.compare("ole", total, t.broadcast(tolerance))
 
 
-def write_keeps_apart(t: IRWriter, earlier: str, before: str, here: str, is_known: str | None = None) -> str:
-    """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence.
+def write_keeps_apart(
+    t: IRWriter, earlier: str, before: str, here: str, is_known: str | None = None, is_cosine: bool = False
+) -> str:
+    """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence or
+    by its cosine.
 
     Between them it does not reach one, by half as much as it bends over all three. So it may be the position before at
     which a block had come too near, and the middle of its change may lie there, as where a run starts just before a
     dead point. `is_known`: flags of whether there are three positions already.
     """
+    maximum = 1.0 - LEAST_KERNEL_REGULARITY**2
     change = t.binary("sub", t.binary("add", here, earlier), t.binary("add", before, before))
     change = t.call_intrinsic("fabs", change)
     half = t.constant(0.5)
     if is_known is not None:
         half = t.select_or_zero(is_known, half)
-    most = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
-    reached = t.binary("add", most, t.binary("mul", change, half))
-    return t.compare("ole", reached, t.constant(1.0 - LEAST_KERNEL_REGULARITY**2))
+    if is_cosine:
+        earlier, before, here = (t.call_intrinsic("fabs", value) for value in (earlier, before, here))
+        maximum = sqrt(maximum)
+    greatest = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
+    reached = t.binary("add", greatest, t.binary("mul", change, half))
+    return t.compare("ole", reached, t.constant(maximum))
 
 
 def write_turns_little(t: IRWriter, angles: Sequence[str], slots: Sequence[str]) -> list[str]:
