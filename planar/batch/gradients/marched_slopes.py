@@ -9,7 +9,7 @@ with A = dF/dz, block after block. What the numbers p of pairs and q of points c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -32,6 +32,8 @@ from planar.equations.rates import block_jacobian, time_derivatives
 from planar.equations.residuals import input_positions, split_pair_numbers
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import UnsupportedOperation
+from planar.foundation.jets import Scalar
+from planar.model.link_shapes import PointMember
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
 
@@ -65,6 +67,24 @@ class SlopeResults(NamedTuple):
             first = stop
 
 
+def numbers_of_file(
+    reference: ReferenceDesign, design: DesignEquations, members: Sequence[PointMember]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """The numbers of pairs, and x and y of points of links, in sizes: expressions in the numbers of the file."""
+    unit, work = reference.unit, design.work
+    numbers = [
+        number
+        for pair in reference.mechanism.pairs
+        for number in scale_lengths(work.numbers[pair.name], pair.number_kinds, unit)
+    ]
+    return numbers, [part / unit for link, point in members for part in work.shapes[link].position(point)]
+
+
+def with_rates(value: ca.SX, y: Sequence[ca.SX]) -> list[ca.SX]:
+    """What is made of y, and its rates, as many as y has."""
+    return [value, *time_derivatives(value, *y)] if len(y) > 1 else [value]
+
+
 class SlopeRows:
     """See `ResultRows`: for each kind of result, order, result and number of the file so many rows as it has parts."""
 
@@ -72,13 +92,7 @@ class SlopeRows:
         self.reference, self.design, self.results = reference, design, results
         self.members = [reference.point_member(name) for name in results.points]
         self.orders, self.row_count = 3 if results.rates else 1, results.row_count
-        numbers = [
-            number
-            for pair in reference.mechanism.pairs
-            for number in scale_lengths(design.work.numbers[pair.name], pair.number_kinds, reference.unit)
-        ]
-        shapes, unit = design.work.shapes, reference.unit
-        places = [part / unit for link, point in self.members for part in shapes[link].position(point)]
+        numbers, places = numbers_of_file(reference, design, self.members)
         self.changes = self._changes(ca.vertcat(ca.SX(0, 1), *numbers, *places))
         varying = [k for k in range(self.changes.nnz()) if not self.changes.nz[k].is_constant()]
         told = [ca.vertcat(ca.SX(0, 1), *of) for of in (places, [self.changes.nz[k] for k in varying])]
@@ -143,7 +157,7 @@ class _SlopeWriter:
     def write(self, have: dict[Operand, str]) -> list[str]:
         """The rows, after the unknowns' slopes have been put into `have`."""
         e, t = self.kernel.equations.equations, self.writer.ir
-        levels = self._with_rates(e.F)
+        levels = with_rates(e.F, self.y)
         many = self.changes.shape[1]
         for part in self.kernel.equations.blocks:
             jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
@@ -177,7 +191,7 @@ class _SlopeWriter:
         """The slopes of all results, row by row."""
         rows = []
         for values, width, scale in self._results():
-            for order, value in enumerate(self._with_rates(values)):
+            for order, value in enumerate(with_rates(values, self.y)):
                 slopes = self._slopes_of(value, order, self.count)
                 for first in range(0, value.numel(), width):
                     for number in range(slopes.shape[1]):
@@ -205,9 +219,6 @@ class _SlopeWriter:
             units = [scale if each.input_kind is MeasureKind.LENGTH else ca.SX(1.0) for each in motions]
             found.append((stack_expressions(values), 1, ca.vertcat(*units)))
         return found
-
-    def _with_rates(self, value: ca.SX) -> list[ca.SX]:
-        return [value, *time_derivatives(value, *self.y)] if self.rows.orders > 1 else [value]
 
 
 MAX_NUMBERS = 8
