@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -63,14 +63,8 @@ class LateSentences(Sequence[str]):
             self._sentences = tuple(self._make())
         return self._sentences
 
-    @overload
-    def __getitem__(self, at: int) -> str: ...
-
-    @overload
-    def __getitem__(self, at: slice) -> Sequence[str]: ...
-
-    def __getitem__(self, at: int | slice) -> str | Sequence[str]:
-        return self._all()[at]
+    def __getitem__(self, index: Any) -> Any:
+        return self._all()[index]
 
     def __len__(self) -> int:
         return len(self._all())

@@ -27,7 +27,6 @@ from planar.batch.prepare.compiled_runs import (
     CompiledRuns,
     RunPositions,
     prepare_runs,
-    run_numbers,
     run_stages,
 )
 from planar.batch.prepare.design_numbers import DesignNumbers
@@ -44,7 +43,6 @@ from planar.batch.prepare.run_code import (
     input_rows,
     load_constant,
     load_numbers,
-    write_design_values,
     write_expressions,
     write_shifted_inputs,
 )
@@ -106,7 +104,7 @@ def _solve_transposed(e: ConstraintEquations, right_side: ca.SX) -> ca.SX:
 
 
 ADJOINT_LANES = 8
-ADJOINT_FUNCTION, SLOPES_FUNCTION, DESIGNS_FUNCTION = "adjoint", "file_slopes", "designs"
+ADJOINT_FUNCTION, DESIGNS_FUNCTION = "adjoint", "designs"
 ADJOINT_ARGUMENTS = (
     "i64 %good, ptr noalias readonly %numbers, ptr noalias readonly %inputs, i64 %width, ptr noalias readonly %state, "
     "i64 %stride, ptr noalias readonly %weights, ptr noalias %sums"
@@ -237,16 +235,21 @@ class GradientWriter:
         unit = self.reference.unit
         slopes = self._file_slopes(design, {operand: unit * sums[1 + k] for k, operand in enumerate(adjoint.derived)})
         t = IRWriter(1)
+        begin_run(t, stages, wanted, ", ptr %weights", sums.numel())
+        inputs = load_constant(t, stages.constants, "wanted inputs")
+        t.write_line(f"%width = mul i64 {load_constant(t, stages.constants, 'blocks')}, {LANES}")
+        states, result = (t.row_pointer("%out", "%width", row, "0") for row in (1, 1 + stages.row_count))
         t.write_line(
-            f"define internal void @{SLOPES_FUNCTION}(ptr %context, ptr %places, ptr %given, ptr %sums, ptr %slopes) {{"
+            f"call void @{ADJOINT_FUNCTION}(i64 %good, ptr %numbers, ptr {inputs}, i64 {width}, ptr {states}, "
+            "i64 %width, ptr %weights, ptr %sums)"
         )
-        t.write_label("entry")
-        write_design_values(t, design)
-        names = write_expressions(t, [unit * sums[0], slopes], {"%values": design.symbols, "%sums": sums})
+        values = t.double_pointer("%numbers", str(stages.order.index(("value", 0))))
+        names = write_expressions(t, [unit * sums[0], slopes], {values: design.symbols, "%sums": sums})
         for k, name in enumerate(names):
-            t.store(name, t.double_pointer("%slopes", str(k)))
-        end_function(t)
-        return [adjoint.ir, t, self._write_designs(stages, wanted, width, sums.numel())]
+            t.store(name, t.double_pointer(result, str(k)))
+        end_run(t)
+        self._write_designs(t, width)
+        return [adjoint.ir, t]
 
     def _file_slopes(self, design: DesignNumbers, sums: dict[Operand, ca.SX]) -> ca.SX:
         """The derivatives in `equations.names`, by the symbols of a design's values, from those in operands."""
@@ -271,20 +274,8 @@ class GradientWriter:
                 input_slopes.append(slope / float(scale))
         return ca.vertcat(*input_slopes, ca.substitute(slopes, equations.d, ca.vertcat(ca.SX(0, 1), *own)))
 
-    def _write_designs(self, stages: RunStages, wanted: range, width: int, sum_count: int) -> IRWriter:
-        """The gradient of one design, and that of many, one after the other."""
-        t = IRWriter(1)
-        begin_run(t, stages, wanted, ", ptr %weights", sum_count)
-        constants = (*stages.constants, "wanted inputs")
-        inputs = load_constant(t, constants, "wanted inputs")
-        t.write_line(f"%width = mul i64 {load_constant(t, constants, 'blocks', 'i64')}, {LANES}")
-        states, slopes = (t.row_pointer("%out", "%width", row, "0") for row in (1, 1 + stages.row_count))
-        t.write_line(
-            f"call void @{ADJOINT_FUNCTION}(i64 %good, ptr %numbers, ptr {inputs}, i64 {width}, ptr {states}, "
-            "i64 %width, ptr %weights, ptr %sums)"
-        )
-        t.write_line(f"call void @{SLOPES_FUNCTION}(ptr %context, ptr %places, ptr %given, ptr %sums, ptr {slopes})")
-        end_run(t)
+    def _write_designs(self, t: IRWriter, width: int) -> None:
+        """The function for many designs, one after the other."""
         t.write_line(
             f"define void @{DESIGNS_FUNCTION}({RUN_ARGUMENTS}, ptr %weights, ptr %sums, ptr %results, i64 %designs) {{"
         )
@@ -309,7 +300,6 @@ class GradientWriter:
         t.close_loop("k", "designs", "design", "done")
         t.write_label("done")
         end_function(t)
-        return t
 
 
 def prepare_gradients(  # many: what a gradient is made of
@@ -332,28 +322,22 @@ def prepare_gradients(  # many: what a gradient is made of
     weighted = [WeightedRow(row // count, number[(row % count) // 2]) for row in rows[::2]]
     members = [reference.point_member(points[point]) for point in chosen]
 
-    def compile_run(grid: RunPositions, zeros: frozenset[str]) -> CompiledRun:
-        design = run_numbers(reference, members, may_shift, zeros)
-        stages = run_stages(reference, design, None, False, grid)
-        return compile_gradient(design, stages, GradientWriter(reference, equations, members, weighted), grid)
+    writer = GradientWriter(reference, equations, members, weighted)
 
-    return prepare_runs(reference, positions, compile_run)
+    def compile_run(design: DesignNumbers, grid: RunPositions) -> CompiledRun:
+        stages = run_stages(reference, design, None, False, grid)
+        inputs = input_rows(design.equations("q").input_operands, grid.u[grid.wanted])
+        stages = stages._replace(constants={**stages.constants, "wanted inputs": inputs})
+        writers = writer.write(design, stages, grid.wanted, inputs.shape[1])
+        width = stages.constants["blocks"] * LANES
+        return CompiledRun(design, stages, writers, grid.wanted, ceil((1 + len(equations.names)) / width))
+
+    return prepare_runs(reference, members, positions, may_shift, compile_run)
 
 
 def padded_width(count: int) -> int:
     """How many numbers a row of weights has: whole vectors of positions."""
     return -(-count // LANES) * LANES
-
-
-def compile_gradient(
-    design: DesignNumbers, stages: RunStages, writer: GradientWriter, grid: RunPositions
-) -> CompiledRun:
-    """The gradient of sums of some rows over a run. Raises UnsupportedOperation."""
-    inputs = input_rows(design.equations("q").input_operands, grid.u[grid.wanted])
-    writers = writer.write(design, stages, grid.wanted, inputs.shape[1])
-    stages = stages._replace(constants={**stages.constants, "wanted inputs": inputs})
-    width = stages.constants["blocks"] * LANES
-    return CompiledRun(design, stages, writers, grid.wanted, ceil((1 + len(writer.equations.names)) / width))
 
 
 def run_designs(bound: BoundRun, designs: Array, weights: Array, count: int) -> tuple[Array, Array]:

@@ -151,7 +151,8 @@ class RunGradients:
         self.bound = frozenset(tied_dimensions(reference.mechanism))
         self._positions, self._span = positions, span
         self._width = padded_width(len(positions))
-        self._compiled: dict[tuple[int, ...], CompiledRuns | None] = {}
+        self.compiled: dict[tuple[int, ...], CompiledRuns | None] = {}
+        "by the rows that are weighted; None where there is no machine code"
         self._bound = [k for k, name in enumerate(self.names) if name in self.bound]
         # inputs that stand still in a run have no rates, despite their numbers
         standing = {each.pair for each in reference.mechanism.inputs} - {reference.pair}
@@ -220,14 +221,14 @@ class RunGradients:
 
     def _compiled_sums(self, rows: tuple[int, ...]) -> CompiledRuns | None:
         """The compiled gradients of sums of these rows; None where there are none."""
-        if rows not in self._compiled:
-            if len(self._compiled) >= MAX_KEPT_SUMS:
-                self._compiled.clear()
+        if rows not in self.compiled:
+            if len(self.compiled) >= MAX_KEPT_SUMS:
+                self.compiled.clear()
             equations, may_shift = design_equations(self.reference.mechanism), self._span == (None, None)
-            self._compiled[rows] = prepare_gradients(
+            self.compiled[rows] = prepare_gradients(
                 self.reference, equations, self.points, rows, self._positions, may_shift
             )
-        return self._compiled[rows]
+        return self.compiled[rows]
 
     def _solve_gradient(self, weights: WeightRows, values: Mapping[str, float]) -> tuple[float, list[float], IntArray]:
         """The same by the motion of the design."""

@@ -8,7 +8,9 @@ what else there may be from below, since squared distances never fall as blocks 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
+from typing import Any
 
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
 from planar.batch.march.kernel import BareAngle, KernelBlock, Operand
@@ -19,7 +21,6 @@ from planar.batch.prepare.run_code import (
     ALL_SOLVED,
     CANNOT_BE_ASSEMBLED,
     CLEARLY_OPEN,
-    COMMON_CONSTANTS,
     DEAD_POINT,
     LANES,
     STAGE_ARGUMENTS,
@@ -39,7 +40,6 @@ from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 START_STAGE, POSITIONS_STAGE = "start", "positions"
-CONSTANTS = (*COMMON_CONSTANTS, "inputs")
 ENUMERATED_BLOCKS = 4
 """Blocks of whose assemblies all combinations are tried."""
 LEAST_STEPS_TO_DEAD_POINT = 3
@@ -54,15 +54,16 @@ def closed_form_stages(design: DesignNumbers, links: tuple[str, ...] | None, rat
     if len(u) < 3:
         raise UnsupportedOperation("two positions do not show what lies between them")
     equations = design.equations("q")
-    order = (*design.numbers, *(("sign", k) for k in range(len(equations.closed_forms))))
+    order = (*design.order, *(("sign", k) for k in range(len(equations.closed_forms))))
+    inputs = input_rows(equations.input_operands, u)
+    blocks = inputs.shape[1] // LANES
+    constants = {"own values": design.own_values, "blocks": blocks, "positions": len(u), "inputs": inputs}
     try:
         start = _StartWriter(design, order).write_stage()
         writer = _PositionsWriter(design, links, rates, order)
-        result_count, row_count = writer.write_stage()
+        result_count, row_count = writer.write_stage(constants)
     except BareAngle as angle:
         raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
-    inputs = input_rows(equations.input_operands, u)
-    constants = dict(zip(CONSTANTS, (design.own_values, inputs.shape[1] // LANES, len(u), inputs), strict=True))
     writers, names = (start, writer.ir), (START_STAGE, POSITIONS_STAGE)
     return RunStages(names, writers, order, constants, result_count, row_count)
 
@@ -152,14 +153,15 @@ class _PositionsWriter(KernelWriter):
         super().__init__(design.equations("q"), links or (), rates, LANES, invariant, frozenset())
         self.order, self.tells_states = order, links is None
 
-    def write_stage(self) -> tuple[int, int]:
+    def write_stage(self, constants: Mapping[str, Any]) -> tuple[int, int]:
         """Write the whole function; return how many rows are results, and how many there are."""
         t, equations = self.ir, self.equations
         t.write_line(f"define internal void @{POSITIONS_STAGE}({STAGE_ARGUMENTS}) {{")
         t.write_label("entry")
-        blocks, positions = (load_constant(t, CONSTANTS, name, "i64") for name in ("blocks", "positions"))
+        blocks, positions, rows_of_inputs = (
+            load_constant(t, constants, name) for name in ("blocks", "positions", "inputs")
+        )
         last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 {positions}, i64 0")
-        rows_of_inputs = load_constant(t, CONSTANTS, "inputs")
         t.write_line(f"%width = mul i64 {blocks}, {LANES}")
         have = load_numbers(t, self.order, "p", "q", "u1", "u2", "sign", "stop", "d", "dc", "ds", "tolerance", "unit")
         t.mark_hoist_point()

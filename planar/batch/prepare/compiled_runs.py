@@ -150,17 +150,25 @@ class CompiledRuns:
 
 def prepare_runs(
     reference: ReferenceDesign,
+    members: Sequence[PointMember],
     positions: Array,
-    compile_run: Callable[[RunPositions, frozenset[str]], CompiledRun],
+    may_shift: bool,
+    compile_run: Callable[[DesignNumbers, RunPositions], CompiledRun],
 ) -> CompiledRuns | None:
-    """The compiled functions of runs over these positions of the running input; None where there are none."""
+    """The compiled functions of runs over these positions of the running input; None where there are none.
+
+    `may_shift`: whether the run starts where the design's own input stands, wherever that is.
+    """
     if not reference.can_be_compiled or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
         return None
     grid = find_positions(reference, positions)
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
+    shifting = {k for k in range(len(reference.mechanism.inputs)) if may_shift or k != reference.running_index}
     try:
-        return CompiledRuns(reference, lambda zeros: compile_run(grid, zeros))
+        return CompiledRuns(
+            reference, lambda zeros: compile_run(DesignNumbers(reference, members, shifting, zeros), grid)
+        )
     except UnsupportedOperation:
         return None
 
@@ -168,27 +176,13 @@ def prepare_runs(
 def prepare_point_runs(
     reference: ReferenceDesign, points: tuple[str, ...], rates: bool, positions: Array, may_shift: bool
 ) -> CompiledRuns | None:
-    """The compiled runs over points.
-
-    `may_shift`: whether the run starts where the design's own input stands, wherever that is.
-    """
+    """The compiled runs over points."""
     members = [reference.point_member(name) for name in points]
 
-    def compile_run(grid: RunPositions, zeros: frozenset[str]) -> CompiledRun:
-        design = run_numbers(reference, members, may_shift, zeros)
+    def compile_run(design: DesignNumbers, grid: RunPositions) -> CompiledRun:
         return CompiledRun(design, run_stages(reference, design, members, rates, grid), (), grid.wanted)
 
-    return prepare_runs(reference, positions, compile_run)
-
-
-def run_numbers(
-    reference: ReferenceDesign, members: Sequence[PointMember], may_shift: bool, zeros: frozenset[str]
-) -> DesignNumbers:
-    """The numbers of a design of a run; `zeros`: lengths that are zero in all designs."""
-    shifting = set(range(len(reference.mechanism.inputs)))
-    if not may_shift:
-        shifting.remove(reference.running_index)
-    return DesignNumbers(reference, members, shifting, zeros)
+    return prepare_runs(reference, members, positions, may_shift, compile_run)
 
 
 def run_stages(

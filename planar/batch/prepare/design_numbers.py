@@ -109,6 +109,8 @@ class DesignNumbers:
         self._add("tolerance", [float(residual_tolerance(len(mechanism.links), 1.0)) * reach])
         self._add("unit", [self.unit])
         self._add("margin", [reduce(ca.fmin, margins, ca.SX(0.0))])
+        self.order: tuple[Operand, ...] = (*self.numbers, *(("value", k) for k in range(len(self.own_values))))
+        "how a run has the numbers, with the values behind them"
         self.points = [part for shape in self.shapes.values() for at in shape.points.values() for part in at]
 
     def equations(self, points: str) -> KernelEquations:

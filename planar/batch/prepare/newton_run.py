@@ -6,8 +6,9 @@ lane solves a piece of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil, inf, log2, log10
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETC
 from planar.batch.assembly.nearest_assemblies import CORRECTIONS
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, write_designs_kernel
-from planar.batch.march.kernel import KernelBlock, KernelEquations, Operand, operand_rows
+from planar.batch.march.kernel import KernelBlock, KernelEquations, operand_rows
 from planar.batch.march.kernel_writer import DesignsKernelLayout
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
@@ -29,7 +30,6 @@ from planar.batch.march.runs import run_designs, step_table, unknowns_at_steps
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_code import (
     ALL_SOLVED,
-    COMMON_CONSTANTS,
     LANES,
     STAGE_ARGUMENTS,
     UNSURE,
@@ -50,22 +50,6 @@ from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 NEWTON_STAGE = "newton"
-CONSTANTS = (
-    *COMMON_CONSTANTS,
-    "corrector",
-    "starts",
-    "start inputs",
-    "start table",
-    "start counts",
-    "march",
-    "states",
-    "inputs",
-    "table",
-    "counts",
-    "steps",
-    "places",
-    "correction limit",
-)
 LEAST_PIECE = PREDICTOR_ORDER + 2
 """Minimum steps of a piece: from fewer too little is predicted."""
 START_CORRECTIONS = 8
@@ -88,27 +72,37 @@ def newton_stages(
     )
     march = write_designs_kernel(equations, links, rates, LANES, (-1,) * len(links), streams=False)
     starts, assembly_counts, lanes = _assembly_lanes(reference, equations)
-    writer = _NewtonWriter(equations, design, (corrector, march), (assembly_counts, lanes))
-    writer.result_count = 2 * len(links) * (3 if rates else 1)
-    writer.write_stage()
     kernels = [compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS) for kernel in (corrector, march)]
     table, counts = _step_table(u, pieces.steps)
     start_table, start_counts = step_table(np.zeros((1, u.shape[1])))
     start_counts[:] = CORRECTIONS
-    first, pieces_u = np.repeat(u[:1].T, LANES, axis=1), np.ascontiguousarray(u[pieces.firsts].T)
-    values = (
-        *(design.own_values, pieces.blocks, len(u), kernels[0]),
-        *(operand_rows(corrector.state, starts), operand_rows(corrector.inputs, first), start_table, start_counts),
-        *(kernels[1], operand_rows(march.state, _own_unknowns(reference, u, members, pieces.firsts))),
-        *(operand_rows(march.inputs, pieces_u), table, counts, pieces.steps + 1),
-        *(pieces.places(march.output_row_count * LANES), correction_limit(longest_step(u))),
-    )
+    constants = {
+        "own values": design.own_values,
+        "blocks": pieces.blocks,
+        "positions": len(u),
+        "corrector": kernels[0],
+        "starts": operand_rows(corrector.state, starts),
+        "start inputs": operand_rows(corrector.inputs, np.repeat(u[:1].T, LANES, axis=1)),
+        "start table": start_table,
+        "start counts": start_counts,
+        "march": kernels[1],
+        "states": operand_rows(march.state, _own_unknowns(reference, u, members, pieces.firsts)),
+        "inputs": operand_rows(march.inputs, u[pieces.firsts].T),
+        "table": table,
+        "counts": counts,
+        "steps": pieces.steps + 1,
+        "places": pieces.places(march.output_row_count * LANES),
+        "correction limit": correction_limit(longest_step(u)),
+    }
+    writer = _NewtonWriter(equations, design, (corrector, march), (assembly_counts, lanes), constants)
+    writer.result_count = 2 * len(links) * (3 if rates else 1)
+    writer.write_stage()
     marched = (pieces.steps + 1) * march.output_row_count * LANES
     return RunStages(
         (NEWTON_STAGE,),
         (writer.ir,),
         writer.order,
-        dict(zip(CONSTANTS, values, strict=True)),
+        constants,
         writer.result_count,
         writer.result_count + len(march.state),
         writer.scratch_size + marched,
@@ -129,10 +123,11 @@ class _NewtonWriter:
         design: DesignNumbers,
         kernels: tuple[DesignsKernelLayout, DesignsKernelLayout],
         assemblies: tuple[list[int], list[range]],
+        constants: Mapping[str, Any],
     ):
-        self.equations, self.design, self.assemblies = equations, design, assemblies
+        self.equations, self.design, self.assemblies, self.constants = equations, design, assemblies, constants
         self.corrector, self.march = kernels
-        self.order: tuple[Operand, ...] = tuple(design.numbers)
+        self.order = design.order
         self.first_state = 4 * len(design.sketched_links)
         "row of the state among those of the corrector"
         self.ir = IRWriter(LANES)
@@ -144,12 +139,10 @@ class _NewtonWriter:
         t.write_line(f"define internal void @{NEWTON_STAGE}({STAGE_ARGUMENTS}) {{")
         t.write_label("entry")
         t.write_line(f"store double {UNSURE}, ptr %out")
-        self.blocks = self._constant("blocks", "i64")
+        self.blocks = self._constant("blocks")
         t.write_line(f"%width = mul i64 {self.blocks}, {LANES}")
-        self.last = t.add_instruction(
-            f"insertelement <{LANES} x i64> poison, i64 {self._constant('positions', 'i64')}, i64 0"
-        )
-        self.limit = self._constant("correction limit", "double")
+        self.last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 {self._constant('positions')}, i64 0")
+        self.limit = self._constant("correction limit")
         rows = {kind: self._write_spread(kind) for kind in ("p", "q", "at", "u1", "u2")}
         corrected = self._write_correction(rows)
         self._go_on_if(self._write_is_nearest(*corrected), "begins")
@@ -162,8 +155,8 @@ class _NewtonWriter:
         vector, pointers, flags = t.vector, f"<{LANES} x ptr>", f"<{LANES} x i1>"
         t.write_line(f"declare {vector} @llvm.masked.gather.v{LANES}f64.v{LANES}p0({pointers}, i32, {flags}, {vector})")
 
-    def _constant(self, name: str, kind: str = "ptr") -> str:
-        return load_constant(self.ir, CONSTANTS, name, kind)
+    def _constant(self, name: str) -> str:
+        return load_constant(self.ir, self.constants, name)
 
     def _number(self, kind: str) -> str:
         return load_number(self.ir, self.order, (kind, 0))
@@ -310,12 +303,12 @@ class _NewtonWriter:
         limits = (self._number("tolerance"), self.limit, self._number("unit"))
         # the rows stand at the end of the memory, where there is room for as many steps as there are
         out, count = self.ir.double_pointer("%scratch", str(self.scratch_size + LANES)), self.march.output_row_count
-        return self._write_kernel_call("march", arrays, self._constant("steps", "i64"), count, limits, out), out
+        return self._write_kernel_call("march", arrays, self._constant("steps"), count, limits, out), out
 
     def _write_gather(self, good: str, out: str) -> None:
         """Write the results and the states of all positions in their order, if all of them are solved and regular."""
         t = self.ir
-        steps = t.broadcast(t.add_instruction(f"sitofp i64 {self._constant('steps', 'i64')} to double"))
+        steps = t.broadcast(t.add_instruction(f"sitofp i64 {self._constant('steps')} to double"))
         self._go_on_if(t.all_flags(t.compare("oeq", t.load(good), steps)), "marched")
         # behind the results the kernel has as many points in the other assembly of their blocks, which is unknown
         first_state = self.march.output_row_count - len(self.march.state) - 1

@@ -46,15 +46,14 @@ RUN_TYPES = ("array",) * 5
 STAGE_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr noalias %numbers, ptr noalias %scratch, ptr noalias %out"
 """The same with the numbers of the design. A stage writes how the run ends; the next one begins if all is solved."""
 STAGE_CALL = "ptr %context, ptr %places, ptr %given, ptr %numbers, ptr %scratch, ptr %out"
-COMMON_CONSTANTS = ("own values", "blocks", "positions")
-"""Constants of every run: values of the file's design, vectors of positions in a row, and positions."""
 
 
 class RunStages(NamedTuple):
     """The stages of a run after that of the numbers, which stand in `order`.
 
-    `constants` by name: addresses of arrays and functions, whole numbers, floats. `row_count` rows are written behind
-    the first one, of which `result_count` are results; `scratch_size` numbers of memory are used.
+    `constants` by name: arrays, functions, whole numbers, floats; the first are the values of the file's design, and
+    "blocks" and "positions" count the vectors of positions in a row, and the positions. `row_count` rows are written
+    behind the first one, of which `result_count` are results; `scratch_size` numbers of memory are used.
     """
 
     names: tuple[str, ...]
@@ -109,9 +108,10 @@ def input_rows(operands: Sequence[Operand], u: Array) -> Array:
     return operand_rows(operands, u[np.minimum(np.arange(width), len(u) - 1)].T)
 
 
-def load_constant(t: IRWriter, names: Sequence[str], name: str, kind: str = "ptr") -> str:
-    """One of the constants of a run."""
-    place = t.add_instruction(f"getelementptr i64, ptr %context, i64 {names.index(name)}")
+def load_constant(t: IRWriter, constants: Mapping[str, Any], name: str) -> str:
+    """One of the constants of a run: a pointer, a whole number or a float."""
+    kind = "i64" if isinstance(constants[name], int) else "double" if isinstance(constants[name], float) else "ptr"
+    place = t.add_instruction(f"getelementptr i64, ptr %context, i64 {[*constants].index(name)}")
     return t.add_instruction(f"load {kind}, ptr {place}")
 
 
@@ -198,14 +198,15 @@ def end_function(t: IRWriter) -> None:
 def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     """The first stage: the numbers of a design in this order.
 
-    All is well where all numbers are finite and the `margin` is not negative; a design with an `opening` cannot be
-    assembled. Raises UnsupportedOperation.
+    All is well where all numbers are finite, the `margin` is not negative, and the magnitudes of given values are
+    reasonable; a design with an `opening` cannot be assembled. Raises UnsupportedOperation.
     """
     t = IRWriter(1)
     t.write_line(f"define internal void @{NUMBERS_STAGE}({STAGE_ARGUMENTS}) {{")
     t.write_label("entry")
-    are_reasonable = write_design_values(t, design)
-    names = write_expressions(t, [*design.numbers.values(), *design.points], {"%values": design.symbols})
+    values = t.double_pointer("%numbers", str(order.index(("value", 0))))
+    are_reasonable = _write_design_values(t, values, design.symbols.numel())
+    names = write_expressions(t, [*design.numbers.values(), *design.points], {values: design.symbols})
     zero = t.constant(0.0)
     # zero, or not a number where one of them is not finite
     products = [t.binary("mul", zero, name) for name in dict.fromkeys(names)]
@@ -223,15 +224,13 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     return t
 
 
-def write_design_values(t: IRWriter, design: DesignNumbers) -> str:
-    """Write the values of a design to %values: those of the file's design, and the given ones in their places.
+def _write_design_values(t: IRWriter, values: str, size: int) -> str:
+    """Write the values of a design: those of the file's design, and the given ones in their places.
 
     Return a flag that the magnitudes of the given ones are reasonable.
     """
-    size = design.symbols.numel()
-    own = load_constant(t, COMMON_CONSTANTS, "own values")
-    t.write_line(f"%values = alloca [{size} x double], align 64")
-    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr {own}, i64 {8 * size}, i1 false)")
+    own = t.add_instruction("load ptr, ptr %context")
+    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr {values}, ptr {own}, i64 {8 * size}, i1 false)")
     slot = t.allocate()
     t.store(t.constant(1.0), slot)
     t.write_line("%count = load i64, ptr %places")
@@ -242,7 +241,7 @@ def write_design_values(t: IRWriter, design: DesignNumbers) -> str:
     number = t.load(t.double_pointer("%given", "%k"))
     after = t.add_instruction("add i64 %k, 1")
     place = t.add_instruction(f"getelementptr i64, ptr %places, i64 {after}")
-    t.store(number, t.double_pointer("%values", t.add_instruction(f"load i64, ptr {place}")))
+    t.store(number, t.double_pointer(values, t.add_instruction(f"load i64, ptr {place}")))
     magnitude = t.call_intrinsic("fabs", number)
     minimum, maximum = (t.constant(bound) for bound in REASONABLE_SIZES)
     is_reasonable = t.and_flags(t.compare("oge", magnitude, minimum), t.compare("ole", magnitude, maximum))
@@ -254,7 +253,7 @@ def write_design_values(t: IRWriter, design: DesignNumbers) -> str:
 
 
 def write_expressions(t: IRWriter, outputs: Sequence[ca.SX], inputs: Mapping[str, ca.SX]) -> list[str]:
-    """Write expressions in symbols whose numbers stand in arrays with these names. Raises UnsupportedOperation."""
+    """Write expressions in symbols whose numbers stand behind these pointers. Raises UnsupportedOperation."""
     function = ca.Function("values", list(inputs.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
     check_length(function.n_instructions())
     listing: InstructionList[tuple[str, int]] = InstructionList()
