@@ -235,7 +235,7 @@ class GradientWriter:
         unit = self.reference.unit
         slopes = self._file_slopes(design, {operand: unit * sums[1 + k] for k, operand in enumerate(adjoint.derived)})
         t = IRWriter(1)
-        begin_run(t, stages, wanted, ", ptr %weights", sums.numel())
+        begin_run(t, stages, wanted, sums.numel())
         inputs = load_constant(t, stages.constants, "wanted inputs")
         t.write_line(f"%width = mul i64 {load_constant(t, stages.constants, 'blocks')}, {LANES}")
         states, result = (t.row_pointer("%out", "%width", row, "0") for row in (1, 1 + stages.row_count))
@@ -276,9 +276,7 @@ class GradientWriter:
 
     def _write_designs(self, t: IRWriter, width: int) -> None:
         """The function for many designs, one after the other."""
-        t.write_line(
-            f"define void @{DESIGNS_FUNCTION}({RUN_ARGUMENTS}, ptr %weights, ptr %sums, ptr %results, i64 %designs) {{"
-        )
+        t.write_line(f"define void @{DESIGNS_FUNCTION}({RUN_ARGUMENTS}, ptr %sums, ptr %results, i64 %designs) {{")
         t.write_label("entry")
         t.write_line("%names = load i64, ptr %places")
         t.write_line("br label %design")
@@ -344,7 +342,7 @@ def run_designs(bound: BoundRun, designs: Array, weights: Array, count: int) -> 
     """The `count` sums and derivatives (designs, 1 + names), and how the runs end (designs,), of designs (designs,
     given names) and weights (designs, pairs of rows, width, 2)."""
     run = bound.run
-    function = compile_function(run.text, DESIGNS_FUNCTION, *RUN_TYPES, *("array",) * 3, "int")
+    function = compile_function(run.text, DESIGNS_FUNCTION, *RUN_TYPES, *("array",) * 2, "int")
     values, results = np.ascontiguousarray(designs, dtype=float), np.empty((len(designs), HEADER + count))
     rows, width = run.shape
     memory = allocate_aligned(1, 1, run.scratch_size + rows * width)

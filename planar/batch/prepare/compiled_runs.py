@@ -16,6 +16,7 @@ from planar.batch.prepare.closed_form_run import closed_form_stages
 from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variables
 from planar.batch.prepare.newton_run import newton_stages
 from planar.batch.prepare.run_code import (
+    ALL_SOLVED,
     UNSURE,
     CompiledRun,
     RunStages,
@@ -88,10 +89,10 @@ class CompiledRuns:
         "whether pairs may refuse a design before anything moves, as wheels that do not mesh"
         self._fitting: dict[str, float] = {}
 
-    def __call__(self, values: Mapping[str, float], *addresses: int) -> tuple[Array, float, int] | None:
-        """The results of a design, how its run ends, and how many positions are good; None where that is not sure.
+    def __call__(self, values: Mapping[str, float], weights: int = 0) -> tuple[Array, float, int] | None:
+        """The results of a design, how its run ends, and how many positions are good if it does not end as it should.
 
-        `addresses`: what the function takes further. Results of a run are its rows (rows, positions).
+        None where that is not sure. `weights`: the address of what a gradient takes.
         """
         names = tuple(values)
         bound = self._bound.get(names) or self.bind(names)
@@ -107,11 +108,11 @@ class CompiledRuns:
             memory = np.empty(run.scratch_size + WIDEST_VECTOR_BYTES // 8)
             scratch = address_of(memory)
             scratch += -scratch % WIDEST_VECTOR_BYTES
-        run.function(run.context, places, packed, scratch, address_of(out), *addresses)
+        run.function(run.context, places, packed, scratch, address_of(out), weights)
         ending = out.item(0)
         if ending == UNSURE or (self.can_misfit and not self._is_fit(values)):
             return None
-        return out[run.results], ending, int(out.item(1))
+        return out[run.results], ending, 0 if ending == ALL_SOLVED else int(out.item(1))
 
     def bind(self, names: tuple[str, ...]) -> BoundRun | None:
         """The function for designs that give these numbers a value; None where there is none."""

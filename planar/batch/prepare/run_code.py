@@ -36,13 +36,13 @@ REASONABLE_SIZES = (1e-99, 1e99)
 
 LANES = 16
 RUN_FUNCTION, NUMBERS_STAGE = "run", "numbers"
-RUN_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out"
+RUN_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out, ptr %weights"
 """The constants of a run, eight bytes each, see `RunStages`; how many values are given, and the place of each among
-those of the file's design; these values; memory; and rows that are written.
+those of the file's design; these values; memory; rows that are written; and the weights of a gradient.
 
 The first row of `out` begins with how the run ends and at which position; stages count all, a run those wanted.
 """
-RUN_TYPES = ("array",) * 5
+RUN_TYPES = ("array",) * 6
 STAGE_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr noalias %numbers, ptr noalias %scratch, ptr noalias %out"
 """The same with the numbers of the design. A stage writes how the run ends; the next one begins if all is solved."""
 STAGE_CALL = "ptr %context, ptr %places, ptr %given, ptr %numbers, ptr %scratch, ptr %out"
@@ -83,7 +83,7 @@ class CompiledRun:
             end_run(writers[0])
         *others, t = writers
         self.text = t.module_text(write_numbers(design, stages.order), *stages.writers, *others)
-        self.function: Any = compile_function(self.text, RUN_FUNCTION, *RUN_TYPES, *("array",) * bool(more_rows))
+        self.function: Any = compile_function(self.text, RUN_FUNCTION, *RUN_TYPES)
         self._context = np.array([_eight_bytes(value) for value in stages.constants.values()], dtype=np.int64)
         self.context = self._context.ctypes.data
         self.shape = 1 + stages.row_count + more_rows, stages.constants["blocks"] * LANES
@@ -139,13 +139,13 @@ def write_shifted_inputs(
     return shifted
 
 
-def begin_run(t: IRWriter, stages: RunStages, wanted: range, more_arguments: str = "", sum_count: int = 0) -> None:
+def begin_run(t: IRWriter, stages: RunStages, wanted: range, sum_count: int = 0) -> None:
     """Begin the function that calls all stages while each goes well, and counts how many `wanted` positions are %good.
 
     A run that ends before the first of them is not sure. What follows is written for runs that are sure alone. There is
     room for so many `%sums`.
     """
-    t.write_line(f"define void @{RUN_FUNCTION}({RUN_ARGUMENTS}{more_arguments}) {{")
+    t.write_line(f"define void @{RUN_FUNCTION}({RUN_ARGUMENTS}) {{")
     t.write_label("entry")
     for array, size in (("numbers", len(stages.order)), ("sums", sum_count)):
         t.write_line(f"%{array} = alloca [{size} x double], align 64")
