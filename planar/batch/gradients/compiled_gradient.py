@@ -20,11 +20,12 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.gradients.marched_slopes import numbers_of_file, with_rates
-from planar.batch.march.kernel import BareAngle, KernelInstructions, Operand
+from planar.batch.march.kernel import KernelInstructions, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.batch.prepare.compiled_runs import (
     BoundRun,
     CompiledRuns,
+    MakeNumbers,
     RunPositions,
     prepare_runs,
     run_stages,
@@ -35,6 +36,7 @@ from planar.batch.prepare.run_code import (
     RUN_ARGUMENTS,
     RUN_FUNCTION,
     RUN_TYPES,
+    STAGE_ARGUMENTS,
     CompiledRun,
     RunStages,
     begin_run,
@@ -104,7 +106,7 @@ def _solve_transposed(e: ConstraintEquations, right_side: ca.SX) -> ca.SX:
 
 
 ADJOINT_LANES = 8
-ADJOINT_FUNCTION, DESIGNS_FUNCTION = "adjoint", "designs"
+STATES_STAGE, ADJOINT_FUNCTION, DESIGNS_FUNCTION = "states", "adjoint", "designs"
 ADJOINT_ARGUMENTS = (
     "i64 %good, ptr noalias readonly %numbers, ptr noalias readonly %inputs, i64 %width, ptr noalias readonly %state, "
     "i64 %stride, ptr noalias readonly %weights, ptr noalias %sums"
@@ -124,14 +126,13 @@ class _AdjointWriter(KernelWriter):
         design: DesignNumbers,
         links: tuple[str, ...],
         rows: Sequence[WeightedRow],
-        order: Sequence[Operand],
         wanted: range,
     ):
         equations, invariant = design.equations("q"), frozenset({"p", "q", "u1", "u2"})
         if equations.has_large_blocks:
             raise UnsupportedOperation("a group has so many unknowns that expressions do not solve it")
         super().__init__(equations, links, any(row.order for row in rows), ADJOINT_LANES, invariant, frozenset())
-        self.order, self.rows, self.wanted = order, rows, wanted
+        self.order, self.rows, self.wanted = design.order, rows, wanted
         self.symbols["weight"] = ca.SX.sym("weight", 2 * len(rows))
         self.outputs = adjoint_expressions(self, rows, self.symbols["weight"])
         _, p, q, u, rates = (output.numel() for output in self.outputs)
@@ -222,26 +223,40 @@ class GradientWriter:
     ):
         self.reference, self.equations, self.members, self.rows = reference, equations, members, rows
 
-    def write(self, design: DesignNumbers, stages: RunStages, wanted: range, width: int) -> list[IRWriter]:
-        """The functions behind the stages of a run, for the `wanted` ones of its positions; rows of weights have this
-        width."""
-        links = tuple(link for link, _ in self.members)
-        try:
-            adjoint = _AdjointWriter(design, links, self.rows, stages.order, wanted)
-            adjoint.write_function()
-        except BareAngle as angle:
-            raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
+    def compile(self, make_numbers: MakeNumbers, grid: RunPositions) -> CompiledRun:
+        """The gradient: its stage is a run for the states, whose code is that of all gradients."""
+        numbers = make_numbers(())
+        run = CompiledRun(numbers, run_stages(self.reference, numbers, None, False, grid), grid.wanted)
+        design, wanted = make_numbers(self.members), grid.wanted
+        inputs = input_rows(design.equations("q").input_operands, grid.u[wanted])
+        width, row_count = inputs.shape[1], run.shape[0] - 1
+        constants = {
+            "own values": design.own_values,
+            "blocks": run.shape[1] // LANES,
+            "run": run.function,
+            "constants": run,
+            "inputs": inputs,
+        }
+        stage = IRWriter(1)
+        stage.write_line(f"define internal void @{STATES_STAGE}({STAGE_ARGUMENTS}) {{")
+        function, context = (load_constant(stage, constants, name) for name in ("run", "constants"))
+        arguments = "ptr %places, ptr %given, ptr %scratch, ptr %out, ptr null"
+        stage.write_line(f"call void {function}(ptr {context}, {arguments})")
+        end_function(stage)
+        adjoint = _AdjointWriter(design, tuple(link for link, _ in self.members), self.rows, wanted)
+        adjoint.write_function()
+        writers = (stage, adjoint.ir)
+        stages = RunStages((STATES_STAGE,), writers, design.order, constants, 0, row_count, run.scratch_size)
         sums = ca.SX.sym("sum", 1 + len(adjoint.derived))
         unit = self.reference.unit
         slopes = self._file_slopes(design, {operand: unit * sums[1 + k] for k, operand in enumerate(adjoint.derived)})
         t = IRWriter(1)
-        begin_run(t, stages, wanted, sums.numel())
-        inputs = load_constant(t, stages.constants, "wanted inputs")
-        t.write_line(f"%width = mul i64 {load_constant(t, stages.constants, 'blocks')}, {LANES}")
-        states, result = (t.row_pointer("%out", "%width", row, "0") for row in (1, 1 + stages.row_count))
+        begin_run(t, stages, range(len(wanted)), sums.numel())
+        t.write_line(f"%width = mul i64 {load_constant(t, constants, 'blocks')}, {LANES}")
+        states, result = (t.row_pointer("%out", "%width", row, "0") for row in (1, 1 + row_count))
         t.write_line(
-            f"call void @{ADJOINT_FUNCTION}(i64 %good, ptr %numbers, ptr {inputs}, i64 {width}, ptr {states}, "
-            "i64 %width, ptr %weights, ptr %sums)"
+            f"call void @{ADJOINT_FUNCTION}(i64 %good, ptr %numbers, ptr {load_constant(t, constants, 'inputs')}, "
+            f"i64 {width}, ptr {states}, i64 %width, ptr %weights, ptr %sums)"
         )
         values = t.double_pointer("%numbers", str(stages.order.index(("value", 0))))
         names = write_expressions(t, [unit * sums[0], slopes], {values: design.symbols, "%sums": sums})
@@ -249,7 +264,7 @@ class GradientWriter:
             t.store(name, t.double_pointer(result, str(k)))
         end_run(t)
         self._write_designs(t, width)
-        return [adjoint.ir, t]
+        return CompiledRun(design, stages, range(len(wanted)), t, ceil(len(names) / run.shape[1]))
 
     def _file_slopes(self, design: DesignNumbers, sums: dict[Operand, ca.SX]) -> ca.SX:
         """The derivatives in `equations.names`, by the symbols of a design's values, from those in operands."""
@@ -319,23 +334,8 @@ def prepare_gradients(  # many: what a gradient is made of
     number = {point: k for k, point in enumerate(chosen)}
     weighted = [WeightedRow(row // count, number[(row % count) // 2]) for row in rows[::2]]
     members = [reference.point_member(points[point]) for point in chosen]
-
     writer = GradientWriter(reference, equations, members, weighted)
-
-    def compile_run(design: DesignNumbers, grid: RunPositions) -> CompiledRun:
-        stages = run_stages(reference, design, None, False, grid)
-        inputs = input_rows(design.equations("q").input_operands, grid.u[grid.wanted])
-        stages = stages._replace(constants={**stages.constants, "wanted inputs": inputs})
-        writers = writer.write(design, stages, grid.wanted, inputs.shape[1])
-        width = stages.constants["blocks"] * LANES
-        return CompiledRun(design, stages, writers, grid.wanted, ceil((1 + len(equations.names)) / width))
-
-    return prepare_runs(reference, members, positions, may_shift, compile_run)
-
-
-def padded_width(count: int) -> int:
-    """How many numbers a row of weights has: whole vectors of positions."""
-    return -(-count // LANES) * LANES
+    return prepare_runs(reference, positions, may_shift, writer.compile)
 
 
 def run_designs(bound: BoundRun, designs: Array, weights: Array, count: int) -> tuple[Array, Array]:

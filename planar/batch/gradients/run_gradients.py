@@ -10,9 +10,9 @@ import numpy as np
 
 from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
 from planar.batch.general_path import OUTCOMES, point_rows, run_design
-from planar.batch.gradients.compiled_gradient import padded_width, prepare_gradients, run_designs
+from planar.batch.gradients.compiled_gradient import prepare_gradients, run_designs
 from planar.batch.prepare.compiled_runs import CompiledRuns, address_of
-from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
+from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE, padded_width
 from planar.batch.reference_design import ReferenceDesign
 from planar.derivatives.design_equations import design_equations
 from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
@@ -94,12 +94,6 @@ def _read_array(given: Any, place: str, shape: tuple[int, int]) -> Array:
     return array
 
 
-def check_finite(weights: WeightRows) -> None:
-    """Refuse weights that are no numbers. Raises BadInput."""
-    if not all(np.isfinite(each).all() for each in weights.arrays):
-        raise BadInput("weights", "a number here is not finite")
-
-
 def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[str, ...]:
     """The numbers by which derivatives are wanted; all where none are named. Raises BadInput."""
     known = tuple(known)
@@ -167,7 +161,8 @@ class RunGradients:
         result = None if compiled is None else self._run_compiled(compiled, weights, values)
         if result is not None:
             return result
-        check_finite(weights)
+        if not all(np.isfinite(array).all() for array in weights.arrays):
+            raise BadInput("weights", "a number here is not finite")
         if values:
             read_designs(self.reference.mechanism, values)
         return self._solve_gradient(weights, values)

@@ -13,7 +13,7 @@ from math import inf
 from typing import Any
 
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
-from planar.batch.march.kernel import BareAngle, KernelBlock, Operand
+from planar.batch.march.kernel import KernelBlock, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.prepare.design_numbers import DesignNumbers
@@ -49,7 +49,7 @@ LEAST_STEPS_TO_DEAD_POINT = 3
 def closed_form_stages(design: DesignNumbers, links: tuple[str, ...] | None, rates: bool, u: Array) -> RunStages:
     """The stages over positions u (positions, inputs) of the file's design, for points on these links.
 
-    Without links the results are what stands for the unknowns. Raises UnsupportedOperation.
+    Without links the results are what stands for the unknowns. Raises UnsupportedOperation, BareAngle.
     """
     if len(u) < 3:
         raise UnsupportedOperation("two positions do not show what lies between them")
@@ -58,12 +58,9 @@ def closed_form_stages(design: DesignNumbers, links: tuple[str, ...] | None, rat
     inputs = input_rows(equations.input_operands, u)
     blocks = inputs.shape[1] // LANES
     constants = {"own values": design.own_values, "blocks": blocks, "positions": len(u), "inputs": inputs}
-    try:
-        start = _StartWriter(design, order).write_stage()
-        writer = _PositionsWriter(design, links, rates, order)
-        result_count, row_count = writer.write_stage(constants)
-    except BareAngle as angle:
-        raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
+    start = _StartWriter(design, order).write_stage()
+    writer = _PositionsWriter(design, links, rates, order)
+    result_count, row_count = writer.write_stage(constants)
     writers, names = (start, writer.ir), (START_STAGE, POSITIONS_STAGE)
     return RunStages(names, writers, order, constants, result_count, row_count)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
 from planar.batch.design_arrays import read_designs, with_design_values
+from planar.batch.march.kernel import BareAngle
 from planar.batch.prepare.closed_form_run import closed_form_stages
 from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variables
 from planar.batch.prepare.newton_run import newton_stages
@@ -29,6 +30,8 @@ from planar.model.link_shapes import PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair
 
+NOT_COMPILED = (UnsupportedOperation, BareAngle)
+"""Why there is no code for a structure: an operation, or an angle that counts its turns."""
 MAX_BOUND_NAMES = 64
 """Sequences of names that are known at once."""
 MAX_CHOICES = 8
@@ -46,6 +49,9 @@ _view = c_char.from_buffer
 def address_of(array: Array) -> int:
     """The address of an array: `array.ctypes.data` in a fifth of its time."""
     return addressof(_view(array))  # type: ignore[arg-type]
+
+
+MakeNumbers = Callable[[Sequence[PointMember]], DesignNumbers]
 
 
 class RunPositions(NamedTuple):
@@ -75,7 +81,7 @@ class CompiledRuns:
     """Functions compiled without the lengths that are zero in the file, as most coordinates of pins on the frame.
 
     For designs that give such a length a value there is a function for each choice of them, made when first needed.
-    Raises UnsupportedOperation.
+    Raises `NOT_COMPILED`.
     """
 
     def __init__(self, reference: ReferenceDesign, compile_run: Callable[[frozenset[str]], CompiledRun]):
@@ -134,7 +140,7 @@ class CompiledRuns:
         if nonzero not in self._runs:
             try:
                 self._runs[nonzero] = self._compile(self._zeros - nonzero)
-            except UnsupportedOperation:
+            except NOT_COMPILED:
                 self._runs[nonzero] = None
         return self._runs[nonzero]
 
@@ -151,14 +157,14 @@ class CompiledRuns:
 
 def prepare_runs(
     reference: ReferenceDesign,
-    members: Sequence[PointMember],
     positions: Array,
     may_shift: bool,
-    compile_run: Callable[[DesignNumbers, RunPositions], CompiledRun],
+    compile_run: Callable[[MakeNumbers, RunPositions], CompiledRun],
 ) -> CompiledRuns | None:
     """The compiled functions of runs over these positions of the running input; None where there are none.
 
-    `may_shift`: whether the run starts where the design's own input stands, wherever that is.
+    `may_shift`: whether the run starts where the design's own input stands, wherever that is. `compile_run` takes what
+    makes the numbers of a design for points on links.
     """
     if not reference.can_be_compiled or not all(pair.measures_symbols for pair in reference.mechanism.pairs):
         return None
@@ -166,11 +172,13 @@ def prepare_runs(
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
     shifting = {k for k in range(len(reference.mechanism.inputs)) if may_shift or k != reference.running_index}
+
+    def compile_for_zeros(zeros: frozenset[str]) -> CompiledRun:
+        return compile_run(lambda members: DesignNumbers(reference, members, shifting, zeros), grid)
+
     try:
-        return CompiledRuns(
-            reference, lambda zeros: compile_run(DesignNumbers(reference, members, shifting, zeros), grid)
-        )
-    except UnsupportedOperation:
+        return CompiledRuns(reference, compile_for_zeros)
+    except NOT_COMPILED:
         return None
 
 
@@ -180,10 +188,11 @@ def prepare_point_runs(
     """The compiled runs over points."""
     members = [reference.point_member(name) for name in points]
 
-    def compile_run(design: DesignNumbers, grid: RunPositions) -> CompiledRun:
-        return CompiledRun(design, run_stages(reference, design, members, rates, grid), (), grid.wanted)
+    def compile_run(make_numbers: MakeNumbers, grid: RunPositions) -> CompiledRun:
+        design = make_numbers(members)
+        return CompiledRun(design, run_stages(reference, design, members, rates, grid), grid.wanted)
 
-    return prepare_runs(reference, members, positions, may_shift, compile_run)
+    return prepare_runs(reference, positions, may_shift, compile_run)
 
 
 def run_stages(

@@ -38,6 +38,7 @@ from planar.batch.prepare.run_code import (
     load_constant,
     load_number,
     load_numbers,
+    padded_width,
     write_shifted_inputs,
 )
 from planar.batch.reference_design import ReferenceDesign
@@ -78,7 +79,7 @@ def newton_stages(
     start_counts[:] = CORRECTIONS
     constants = {
         "own values": design.own_values,
-        "blocks": pieces.blocks,
+        "blocks": pieces.width // LANES,
         "positions": len(u),
         "corrector": kernels[0],
         "starts": operand_rows(corrector.state, starts),
@@ -236,14 +237,16 @@ class _NewtonWriter:
         regularity = self._row(out, self.first_state + len(self.corrector.state))
         is_regular = t.compare("ogt", regularity, t.constant(CLEAR_REGULARITY**2))
         is_nearest, earlier_cost = converged, t.constant(0.0)
-        points = [[k for k, block in enumerate(blocks) if block == part.block.block_index] for part in self._parts]
+        points = [
+            [k for k, block in enumerate(blocks) if block == part.block.block_index] for part in self.equations.blocks
+        ]
         total = self._lane(t.add_all([costs[k] for indices in points for k in indices]))
 
         def is_farther(other: str) -> str:
             distance = t.binary("add", total, t.constant(EQUAL_DISTANCE_TOLERANCE))
             return t.compare("ogt", t.binary("add", earlier_cost, other), distance)
 
-        for part, indices, count, lanes in zip(self._parts, points, *self.assemblies, strict=True):
+        for part, indices, count, lanes in zip(self.equations.blocks, points, *self.assemblies, strict=True):
             cost = t.add_all([costs[k] for k in indices])
             first_cost = self._lane(cost)
             if part.closed_form is not None:
@@ -260,10 +263,6 @@ class _NewtonWriter:
                 is_nearest = t.and_flags(t.and_flags(is_nearest, is_regular), is_first)
             earlier_cost = t.add_instruction(f"fadd {t.vector} {earlier_cost}, {first_cost}")
         return t.add_instruction(f"extractelement <{LANES} x i1> {is_nearest}, i64 0")
-
-    @property
-    def _parts(self) -> tuple[KernelBlock, ...]:
-        return self.equations.blocks
 
     def _write_squared_distance(self, out: str, row: int, target: Sequence[str]) -> str:
         t = self.ir
@@ -338,7 +337,7 @@ class _NewtonWriter:
         # one limit for all blocks: that of the smallest
         minimum = max(
             least_regularity(LEAST_KERNEL_REGULARITY**2, len(part.unknowns))
-            for part in self._parts
+            for part in self.equations.blocks
             if part.closed_form is None
         )
         self._go_on_if(t.all_flags(t.compare("oge", t.load(worst), t.constant(minimum))), "regular")
@@ -385,12 +384,12 @@ class _Pieces:
         self.positions, self.steps = positions, ceil((positions - 1) / LANES)
         if self.steps < LEAST_PIECE:
             raise UnsupportedOperation("so few steps do not show where the lanes go")
-        self.blocks = ceil(positions / LANES)
+        self.width = padded_width(positions)
         self.firsts = np.round(np.arange(LANES) * ((positions - 1 - self.steps) / (LANES - 1))).astype(int)
 
     def places(self, stride: int) -> Array:
         """The place of each position in the rows of the march, so far from step to step; the last one is repeated."""
-        position = np.minimum(np.arange(self.blocks * LANES), self.positions - 1)
+        position = np.minimum(np.arange(self.width), self.positions - 1)
         lane = np.searchsorted(self.firsts, position, side="right") - 1
         return ((position - self.firsts[lane]) * stride + lane).astype(np.int64)
 

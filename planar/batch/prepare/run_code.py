@@ -51,9 +51,9 @@ STAGE_CALL = "ptr %context, ptr %places, ptr %given, ptr %numbers, ptr %scratch,
 class RunStages(NamedTuple):
     """The stages of a run after that of the numbers, which stand in `order`.
 
-    `constants` by name: arrays, functions, whole numbers, floats; the first are the values of the file's design, and
-    "blocks" and "positions" count the vectors of positions in a row, and the positions. `row_count` rows are written
-    behind the first one, of which `result_count` are results; `scratch_size` numbers of memory are used.
+    `constants` by name: arrays, functions, runs, whole numbers, floats; the first are the values of the file's design,
+    and "blocks" counts the vectors of positions in a row. `row_count` rows are written behind the first one, of which
+    `result_count` are results; `scratch_size` numbers of memory are used.
     """
 
     names: tuple[str, ...]
@@ -68,21 +68,20 @@ class RunStages(NamedTuple):
 class CompiledRun:
     """A run compiled with the constants of its stages.
 
-    Behind the rows of the stages `out` has room for `more_rows`; `results` is the part of it that a call returns.
+    Behind the rows of the stages `out` has room for `more_rows`; `results` is the part of it that a call returns, at
+    the `wanted` positions.
     """
 
     def __init__(
-        self, design: DesignNumbers, stages: RunStages, writers: Sequence[IRWriter], wanted: range, more_rows: int = 0
+        self, design: DesignNumbers, stages: RunStages, wanted: range, t: IRWriter | None = None, more_rows: int = 0
     ):
-        """`writers`: what stands behind the stages, last of all the function, for the `wanted` ones of its positions;
-        without writers it calls the stages alone."""
+        """`t` has the function; by default it calls the stages alone."""
         self._constants, self.index = stages.constants, design.index
-        if not writers:
-            writers = [IRWriter(1)]
-            begin_run(writers[0], stages, wanted)
-            end_run(writers[0])
-        *others, t = writers
-        self.text = t.module_text(write_numbers(design, stages.order), *stages.writers, *others)
+        if t is None:
+            t = IRWriter(1)
+            begin_run(t, stages, wanted)
+            end_run(t)
+        self.text = t.module_text(write_numbers(design, stages.order), *stages.writers)
         self.function: Any = compile_function(self.text, RUN_FUNCTION, *RUN_TYPES)
         self._context = np.array([_eight_bytes(value) for value in stages.constants.values()], dtype=np.int64)
         self.context = self._context.ctypes.data
@@ -94,18 +93,24 @@ class CompiledRun:
 
 
 def _eight_bytes(value: Any) -> int:
-    """A constant as a whole number: the address of an array or a function, the bits of a float."""
+    """A constant as a whole number: an address of an array, a function or constants of a run, the bits of a float."""
     if isinstance(value, np.ndarray):
         return value.ctypes.data
+    if isinstance(value, CompiledRun):
+        return value.context
     if isinstance(value, float):
         return int(np.array(value).view(np.int64))
     return value if isinstance(value, int) else ctypes.cast(value, ctypes.c_void_p).value or 0
 
 
+def padded_width(count: int) -> int:
+    """How many numbers a row of so many positions has: whole vectors."""
+    return -(-count // LANES) * LANES
+
+
 def input_rows(operands: Sequence[Operand], u: Array) -> Array:
     """Inputs at positions u (positions, inputs) as rows of whole vectors; behind the last position it is repeated."""
-    width = -(-len(u) // LANES) * LANES
-    return operand_rows(operands, u[np.minimum(np.arange(width), len(u) - 1)].T)
+    return operand_rows(operands, u[np.minimum(np.arange(padded_width(len(u))), len(u) - 1)].T)
 
 
 def load_constant(t: IRWriter, constants: Mapping[str, Any], name: str) -> str:
