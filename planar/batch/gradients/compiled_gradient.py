@@ -24,10 +24,8 @@ from planar.batch.march.kernel import KernelInstructions, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.batch.prepare.compiled_runs import (
     BoundRun,
-    CompiledRuns,
     MakeNumbers,
     RunPositions,
-    prepare_runs,
     run_stages,
 )
 from planar.batch.prepare.design_numbers import DesignNumbers
@@ -51,14 +49,13 @@ from planar.batch.prepare.run_code import (
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.derivatives.design_equations import DesignEquations
+from planar.derivatives.design_equations import design_equations
 from planar.derivatives.parameters import INPUT_RATES
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import block_jacobian
 from planar.equations.symbolic_equations import ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import UnsupportedOperation
-from planar.model.link_shapes import PointMember
 
 
 class WeightedRow(NamedTuple):
@@ -209,22 +206,23 @@ HEADER = 2
 
 
 class GradientWriter:
-    """Writes the function for weighted rows of points (by their `members`, link and point).
+    """Writes the function for sums of some `rows` of a run over points, x and y of each point one after the other.
 
-    Raises UnsupportedOperation.
+    It takes weights (pairs of rows, `padded_width`, 2), and gives the sum and its derivatives in `equations.names`.
     """
 
-    def __init__(
-        self,
-        reference: ReferenceDesign,
-        equations: DesignEquations,
-        members: Sequence[PointMember],
-        rows: Sequence[WeightedRow],
-    ):
-        self.reference, self.equations, self.members, self.rows = reference, equations, members, rows
+    def __init__(self, reference: ReferenceDesign, points: tuple[str, ...], rows: tuple[int, ...]):
+        self.reference, self.equations = reference, design_equations(reference.mechanism)
+        orders, numbers = zip(*(divmod(row // 2, len(points)) for row in rows[::2]), strict=True)
+        chosen = [*dict.fromkeys(numbers)]
+        self.members = [reference.point_member(points[number]) for number in chosen]
+        self.rows = [WeightedRow(order, chosen.index(number)) for order, number in zip(orders, numbers, strict=True)]
 
     def compile(self, make_numbers: MakeNumbers, grid: RunPositions) -> CompiledRun:
-        """The gradient: its stage is a run for the states, whose code is that of all gradients."""
+        """The gradient: its stage is a run for the states, whose code is that of all gradients.
+
+        Raises UnsupportedOperation, BareAngle.
+        """
         numbers = make_numbers(())
         run = CompiledRun(numbers, run_stages(self.reference, numbers, None, False, grid), grid.wanted)
         design, wanted = make_numbers(self.members), grid.wanted
@@ -313,29 +311,6 @@ class GradientWriter:
         t.close_loop("k", "designs", "design", "done")
         t.write_label("done")
         end_function(t)
-
-
-def prepare_gradients(  # many: what a gradient is made of
-    reference: ReferenceDesign,
-    equations: DesignEquations,
-    points: tuple[str, ...],
-    rows: tuple[int, ...],
-    positions: Array,
-    may_shift: bool,
-) -> CompiledRuns | None:
-    """The compiled gradients of a run over these positions of the running input, of sums of these rows of its points;
-    None where there are none.
-
-    They take weights (pairs of rows, `padded_width`, 2), and give the sum and its derivatives in `equations.names`
-    (1 + names,), how the run ends, and how many of its positions are good.
-    """
-    count = 2 * len(points)
-    chosen = dict.fromkeys((row % count) // 2 for row in rows)
-    number = {point: k for k, point in enumerate(chosen)}
-    weighted = [WeightedRow(row // count, number[(row % count) // 2]) for row in rows[::2]]
-    members = [reference.point_member(points[point]) for point in chosen]
-    writer = GradientWriter(reference, equations, members, weighted)
-    return prepare_runs(reference, positions, may_shift, writer.compile)
 
 
 def run_designs(bound: BoundRun, designs: Array, weights: Array, count: int) -> tuple[Array, Array]:

@@ -10,11 +10,10 @@ import numpy as np
 
 from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
 from planar.batch.general_path import OUTCOMES, point_rows, run_design
-from planar.batch.gradients.compiled_gradient import prepare_gradients, run_designs
-from planar.batch.prepare.compiled_runs import CompiledRuns, address_of
+from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
+from planar.batch.prepare.compiled_runs import CompiledRuns, address_of, prepare_runs
 from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE, padded_width
 from planar.batch.reference_design import ReferenceDesign
-from planar.derivatives.design_equations import design_equations
 from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
 from planar.derivatives.parameters import Parameters
 from planar.derivatives.result_slopes import tied_dimensions
@@ -219,10 +218,8 @@ class RunGradients:
         if rows not in self.compiled:
             if len(self.compiled) >= MAX_KEPT_SUMS:
                 self.compiled.clear()
-            equations, may_shift = design_equations(self.reference.mechanism), self._span == (None, None)
-            self.compiled[rows] = prepare_gradients(
-                self.reference, equations, self.points, rows, self._positions, may_shift
-            )
+            writer, may_shift = GradientWriter(self.reference, self.points, rows), self._span == (None, None)
+            self.compiled[rows] = prepare_runs(self.reference, self._positions, may_shift, writer.compile)
         return self.compiled[rows]
 
     def _solve_gradient(self, weights: WeightRows, values: Mapping[str, float]) -> tuple[float, list[float], IntArray]:
