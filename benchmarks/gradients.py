@@ -74,8 +74,7 @@ def case(model: str, rates: bool) -> Case:
         wanted = planar.gradient(motion, {every[-1]: {order: of[every[-1]] for order, of in weights.items()}})
         off = np.array([found.derivatives[key] - each for key, each in wanted.items()])
         error = float(np.nanmax(np.abs(off)) / np.nanmax(np.abs(list(wanted.values()))))
-    native = ready.run_gradients._native
-    is_native = any(each is not None for each in native.values())
+    is_native = any(runs is not None for runs in ready.run_gradients.compiled.values())
     return Case(
         model,
         rates,

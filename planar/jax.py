@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from planar.batch.linkage_layer import LayerRange, LinkageLayer
+from planar.batch.linkage_layer import LinkageLayer
+from planar.batch.prepared import RangeArguments
 from planar.foundation.errors import BadInput
 
 try:
@@ -45,7 +46,9 @@ class Linkage:
         pair: str | None = None,
     ):
         _check_precision()
-        self.layer = LinkageLayer(mechanism, free, points, steps, rates, LayerRange(start, stop, pair))
+        self.layer = LinkageLayer(
+            mechanism, free, points, steps, rates, RangeArguments(start=start, stop=stop, pair=pair)
+        )
         self.file_values = jax.numpy.asarray(self.layer.file_values)
         self._run = _differentiable(self.layer)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from planar.batch.linkage_layer import LayerRange, LinkageLayer
+from planar.batch.linkage_layer import LinkageLayer
+from planar.batch.prepared import RangeArguments
 from planar.foundation.errors import BadInput
 
 try:
@@ -44,7 +45,9 @@ class Linkage(torch.nn.Module):
         pair: str | None = None,
     ):
         super().__init__()
-        self.layer = LinkageLayer(mechanism, free, points, steps, rates, LayerRange(start, stop, pair))
+        self.layer = LinkageLayer(
+            mechanism, free, points, steps, rates, RangeArguments(start=start, stop=stop, pair=pair)
+        )
         self.register_buffer("file_values", torch.from_numpy(self.layer.file_values.copy()), persistent=False)
 
     def forward(self, values: torch.Tensor) -> tuple[torch.Tensor, ...]:

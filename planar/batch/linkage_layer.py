@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from planar.batch.gradients.run_gradients import ORDERS, read_names
-from planar.batch.prepared import prepared
+from planar.batch.prepared import PreparedRun, RangeArguments, prepared
+from planar.batch.results import Sweep
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput
 
 LEAST_SWEPT_DESIGNS = 32
 """Designs from which on they are swept; fewer run one after the other."""
-
-
-class LayerRange(NamedTuple):
-    """Where the running input starts and stops (rad or m; None: by itself), and its pair; see `planar.prepared`."""
-
-    start: float | None = None
-    stop: float | None = None
-    pair: str | None = None
 
 
 class LinkageLayer:
@@ -38,9 +31,9 @@ class LinkageLayer:
         points: Sequence[str] | str | None,
         steps: int,
         rates: bool,
-        over: LayerRange,
+        over: RangeArguments,
     ):
-        self._runs = prepared(mechanism, steps, points, rates=rates, **over._asdict())
+        self._runs = prepared(mechanism, steps, points, rates=rates, **over)
         known = self._runs.derivative_values
         self.free = read_names(free, known)
         if not self.free:
@@ -61,26 +54,24 @@ class LinkageLayer:
         """What the runs of designs (..., free) tell, an array (..., *result_shape) for each order, and which positions
         are solved (..., steps + 1). What is not solved is 0."""
         designs = np.asarray(values, dtype=float).reshape(-1, len(self.free))
-        found = np.zeros((len(self.orders), len(designs), self.result_shape[0], len(self.points), 2))
+        results = np.zeros((len(self.orders), len(designs), self.result_shape[0], len(self.points), 2))
         solved = np.zeros((len(designs), self.result_shape[0]), dtype=bool)
         known = np.flatnonzero(np.isfinite(designs).all(axis=1))
+        runs: list[tuple[Any, PreparedRun | Sweep]] = []
         if len(known) < LEAST_SWEPT_DESIGNS:
-            for k in known:
-                told = self._runs(dict(zip(self.free, designs[k].tolist(), strict=True)))
-                for order, name in enumerate(self.orders):
-                    for number, point in enumerate(self.points):
-                        found[order, k, :, number] = getattr(told, name)[point]
-                solved[k] = told.status == 0
+            runs += [(k, self._runs(dict(zip(self.free, designs[k].tolist(), strict=True)))) for k in known]
         else:
-            swept = self._runs.sweep(dict(zip(self.free, designs[known].T, strict=True)))
+            runs.append((known, self._runs.sweep(dict(zip(self.free, designs[known].T, strict=True)))))
+        for index, run in runs:
             for order, name in enumerate(self.orders):
                 for number, point in enumerate(self.points):
-                    found[order, known, :, number] = getattr(swept, name)[point]
-            solved[known] = np.asarray(swept.status) == 0
-        solved &= np.isfinite(found).all(axis=(0, 3, 4))
-        found[:, ~solved] = 0.0
+                    results[order, index, :, number] = getattr(run, name)[point]
+            solved[index] = np.asarray(run.status) == 0
+        solved &= np.isfinite(results).all(axis=(0, 3, 4))
+        results[:, ~solved] = 0.0
         lead = np.shape(values)[:-1]
-        return [each.reshape(*lead, *self.result_shape) for each in found], solved.reshape(*lead, self.result_shape[0])
+        orders: list[Array] = [order.reshape(*lead, *self.result_shape) for order in results]
+        return orders, solved.reshape(*lead, self.result_shape[0])
 
     def pull_back(self, values: Array, weights: Sequence[Array]) -> Array:
         """The derivatives (..., free) of the sum of what is told times weights, one array for each order as `run` has
@@ -90,11 +81,11 @@ class LinkageLayer:
         given = np.stack([np.asarray(each, dtype=float).reshape(shape) for each in weights], axis=1)
         pairs = given.transpose(0, 1, 3, 2, 4).reshape(len(designs), -1, self.result_shape[0], 2)
         known = np.isfinite(designs).all(axis=1)
-        every = self._runs.run_gradients
-        wanted = [every.names.index(name) for name in self.free]
-        found, rows = np.zeros(designs.shape), tuple(range(2 * pairs.shape[1]))
-        found[known] = every.slopes_of_designs(rows, self.free, designs[known], pairs[known])[:, wanted]
-        return found.reshape(np.shape(values))
+        gradients = self._runs.run_gradients
+        columns = [gradients.names.index(name) for name in self.free]
+        slopes, rows = np.zeros(designs.shape), tuple(range(2 * pairs.shape[1]))
+        slopes[known] = gradients.slopes_of_designs(rows, self.free, designs[known], pairs[known])[:, columns]
+        return slopes.reshape(np.shape(values))
 
     def check_shape(self, shape: Sequence[int]) -> None:
         """Refuse values that are not (..., free). Raises BadInput."""

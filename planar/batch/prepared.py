@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables
 from planar.batch.gradients.run_gradients import RunGradient, RunWeights, read_names, read_weights
-from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
-from planar.batch.prepare.run_calls import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
+from planar.batch.prepare.compiled_runs import prepare_point_runs
+from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.sweep import check_range, sweep
@@ -64,14 +63,8 @@ class LateSentences(Sequence[str]):
             self._sentences = tuple(self._make())
         return self._sentences
 
-    @overload
-    def __getitem__(self, at: int) -> str: ...
-
-    @overload
-    def __getitem__(self, at: slice) -> Sequence[str]: ...
-
-    def __getitem__(self, at: int | slice) -> str | Sequence[str]:
-        return self._all()[at]
+    def __getitem__(self, index: Any) -> Any:
+        return self._all()[index]
 
     def __len__(self) -> int:
         return len(self._all())
@@ -91,7 +84,7 @@ class LateSentences(Sequence[str]):
 
 PLAIN_NUMBERS = frozenset({float, int, np.float64})
 """Types of values that are surely one number."""
-NOTHING_SAID: Sequence[str] = ()
+NO_REMARKS: Sequence[str] = ()
 
 
 class PreparedRun(NamedTuple):
@@ -171,7 +164,7 @@ class PreparedSweep:
         # a slide without a stop runs in each design between limits of its own
         is_alike = not (self.reference.is_sliding and stop is None)
         may_shift = start is None and stop is None
-        self._runs = prepare_native_run(self.reference, self.points, rates, self.input, may_shift) if is_alike else None
+        self._runs = prepare_point_runs(self.reference, self.points, rates, self.input, may_shift) if is_alike else None
         self._index = {name: 2 * k for k, name in enumerate(self.points)}
         self._solved_status = np.zeros(steps + 1, dtype=np.int8)
         self._solved_status.flags.writeable = False
@@ -187,28 +180,22 @@ class PreparedSweep:
     def __call__(self, values: Mapping[str, float] | None = None) -> PreparedRun:
         """The run of one design. Raises BadInput for a name that is not there."""
         values = self._read_values(values)
-        if self._runs is None:
+        results = None if self._runs is None else self._runs(values)
+        if results is None:
             return self._run_as_sweep(values)
-        try:
-            found, ending, end = self._runs.run(values)
-        except KeyError:
-            found, ending, end = self._run_other(self._runs, values)
-        except (struct.error, TypeError):  # which the sweep says in words
-            ending = UNSURE
-        if ending == UNSURE:
-            return self._run_as_sweep(values)
-        status, said = self._solved_status, NOTHING_SAID
+        rows, ending, end = results
+        status, remarks = self._solved_status, NO_REMARKS
         if ending != ALL_SOLVED:
-            found[:, end:] = np.nan
+            rows[:, end:] = np.nan
             status = np.zeros(len(self._solved_status), dtype=np.int8)
             status[end:] = STATUS_OF_ENDING[ending]
-            kept = dict(values)
-            said = LateSentences(lambda: self._run_as_sweep(kept).remarks)
-        position, wide = KeptPoints(found, self._index, 0), 2 * len(self.points)
+            design = dict(values)
+            remarks = LateSentences(lambda: self._run_as_sweep(design).remarks)
+        position, count = KeptPoints(rows, self._index, 0), 2 * len(self.points)
         if not self.rates:
-            return PreparedRun(position, None, None, status, said)
-        orders = KeptPoints(found, self._index, wide), KeptPoints(found, self._index, 2 * wide)
-        return PreparedRun(position, *orders, status, said)
+            return PreparedRun(position, None, None, status, remarks)
+        orders = KeptPoints(rows, self._index, count), KeptPoints(rows, self._index, 2 * count)
+        return PreparedRun(position, *orders, status, remarks)
 
     def gradient(
         self, weights: RunWeights, values: Mapping[str, float] | None = None, *, of: Sequence[str] | str | None = None
@@ -256,8 +243,8 @@ class PreparedSweep:
         """What `gradient` asks. Raises BadInput where derivatives are not told of the structure."""
         from planar.batch.gradients.run_gradients import RunGradients  # derivatives are seldom wanted
 
-        ends = self.range["start"], self.range["stop"]
-        return RunGradients(self.reference, self.points, self.rates, self.input, *ends)
+        span = self.range["start"], self.range["stop"]
+        return RunGradients(self.reference, self.points, self.rates, self.input, span)
 
     @staticmethod
     def _read_values(values: Mapping[str, float] | None) -> Mapping[str, float]:
@@ -265,13 +252,6 @@ class PreparedSweep:
         if not PLAIN_NUMBERS.issuperset(map(type, values.values())):
             values = {name: _check_number(name, value) for name, value in values.items()}
         return values
-
-    def _run_other(self, runs: NativeRuns, values: Mapping[str, float]) -> tuple[Array, float, int]:
-        """The run of a design with a name that the usual function does not know."""
-        try:
-            return runs.run_other(values)
-        except (KeyError, struct.error, TypeError):
-            return np.empty((0, 0)), UNSURE, 0
 
     def sweep(self, designs: Mapping[str, Any]) -> Sweep:
         """The same of many designs at once, as `planar.sweep` has it."""

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.linkage_layer import LayerRange, LinkageLayer
+from planar.batch.linkage_layer import LinkageLayer
+from planar.batch.prepared import RangeArguments
 from planar.foundation.errors import BadInput
 from tests.draws import first_cases, is_exhaustive
 
 FREE = ["crank.length", "coupler.length"]
 
 
-def make(points="B", steps=24, rates=False, stem="crank-rocker", free=FREE, over=None):
-    return LinkageLayer(stem, free, points, steps, rates, over or LayerRange())
+def make(points="B", steps=24, rates=False, stem="crank-rocker", free=FREE):
+    return LinkageLayer(stem, free, points, steps, rates, RangeArguments(start=None, stop=None, pair=None))
 
 
 def test_runs_are_those_of_a_sweep():

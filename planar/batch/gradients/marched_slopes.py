@@ -9,7 +9,7 @@ with A = dF/dz, block after block. What the numbers p of pairs and q of points c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -32,6 +32,8 @@ from planar.equations.rates import block_jacobian, time_derivatives
 from planar.equations.residuals import input_positions, split_pair_numbers
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import UnsupportedOperation
+from planar.foundation.jets import Scalar
+from planar.model.link_shapes import PointMember
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
 
@@ -57,12 +59,30 @@ class SlopeResults(NamedTuple):
     def split_rows(self, rows: Array) -> Iterator[Array]:
         """Of rows (steps + 1, rows, designs) those of points, links and pairs: views (steps + 1, orders times results,
         numbers, parts, designs)."""
-        first, many = 0, len(self.numbers)
+        first, count = 0, len(self.numbers)
         for results, parts in ((self.points, 2), (self.links, 1), (self.pairs, 1)):
             lines = len(results) * (3 if self.rates else 1)
-            stop = first + lines * many * parts
-            yield rows[:, first:stop].reshape(len(rows), lines, many, parts, rows.shape[2])
+            stop = first + lines * count * parts
+            yield rows[:, first:stop].reshape(len(rows), lines, count, parts, rows.shape[2])
             first = stop
+
+
+def numbers_of_file(
+    reference: ReferenceDesign, design: DesignEquations, members: Sequence[PointMember]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """The numbers of pairs, and x and y of points of links, in sizes: expressions in the numbers of the file."""
+    unit, work = reference.unit, design.work
+    numbers = [
+        number
+        for pair in reference.mechanism.pairs
+        for number in scale_lengths(work.numbers[pair.name], pair.number_kinds, unit)
+    ]
+    return numbers, [part / unit for link, point in members for part in work.shapes[link].position(point)]
+
+
+def with_rates(value: ca.SX, y: Sequence[ca.SX]) -> list[ca.SX]:
+    """What is made of y, and its rates, as many as y has."""
+    return [value, *time_derivatives(value, *y)] if len(y) > 1 else [value]
 
 
 class SlopeRows:
@@ -72,17 +92,11 @@ class SlopeRows:
         self.reference, self.design, self.results = reference, design, results
         self.members = [reference.point_member(name) for name in results.points]
         self.orders, self.row_count = 3 if results.rates else 1, results.row_count
-        numbers = [
-            number
-            for pair in reference.mechanism.pairs
-            for number in scale_lengths(design.work.numbers[pair.name], pair.number_kinds, reference.unit)
-        ]
-        shapes, unit = design.work.shapes, reference.unit
-        places = [part / unit for link, point in self.members for part in shapes[link].position(point)]
+        numbers, places = numbers_of_file(reference, design, self.members)
         self.changes = self._changes(ca.vertcat(ca.SX(0, 1), *numbers, *places))
         varying = [k for k in range(self.changes.nnz()) if not self.changes.nz[k].is_constant()]
-        told = [ca.vertcat(ca.SX(0, 1), *of) for of in (places, [self.changes.nz[k] for k in varying])]
-        self._numbers = BufferedFunction(ca.Function("numbers", [design.d], [ca.densify(each) for each in told]))
+        columns = [ca.vertcat(ca.SX(0, 1), *values) for values in (places, [self.changes.nz[k] for k in varying])]
+        self._numbers = BufferedFunction(ca.Function("numbers", [design.d], [ca.densify(each) for each in columns]))
         self.numbers = ca.SX.sym("number", len(varying))
         "the further numbers of a design: what is changed by no constant"
         for number, k in enumerate(varying):
@@ -93,12 +107,13 @@ class SlopeRows:
         design, inputs = self.design, len(self.reference.mechanism.inputs)
         columns = []
         for name in self.results.numbers:
-            of_inputs, k = ca.SX(3 * inputs, 1), design.names.index(name)
+            input_change, k = ca.SX(3 * inputs, 1), design.names.index(name)
+            change = ca.SX(taken.numel(), 1)
             if k < 3 * inputs:
-                of_inputs[k] = 1.0 / float(self.reference.input_scale[k % inputs])
-                columns.append(ca.vertcat(ca.SX(taken.numel(), 1), of_inputs))
+                input_change[k] = 1.0 / float(self.reference.input_scale[k % inputs])
             else:
-                columns.append(ca.vertcat(ca.jacobian(taken, design.t[k]), of_inputs))
+                change = ca.jacobian(taken, design.t[k])
+            columns.append(ca.vertcat(change, input_change))
         return ca.sparsify(ca.horzcat(*columns))
 
     def design_numbers(self, values: Mapping[str, Array], count: int) -> tuple[Array, Array]:
@@ -130,21 +145,19 @@ class _SlopeWriter:
         self.kernel, self.count = kernel, e.z.numel()
         self.unknowns = [e.z, s["z1"], s["z2"]][: rows.orders]
         self.y = [e.y, ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])][: rows.orders]
-        many = len(rows.results.numbers)
-        s["slope"] = ca.SX.sym("slope", rows.orders * many * self.count)
-        # of every order the unknowns' slopes (unknowns, numbers)
-        size = many * self.count
-        self.slopes = [
-            ca.reshape(s["slope"][order * size : (order + 1) * size], self.count, many) for order in range(rows.orders)
-        ]
-        self.given = ca.vertcat(*(s[kind] for kind in CHANGING))
+        number_count = len(rows.results.numbers)
+        s["slope"] = ca.SX.sym("slope", rows.orders * number_count * self.count)
+        columns = ca.reshape(s["slope"], self.count, rows.orders * number_count)
+        # the slopes of the unknowns (unknowns, numbers) of every order
+        self.slopes = [columns[:, k * number_count : (k + 1) * number_count] for k in range(rows.orders)]
+        self.arguments = ca.vertcat(*(s[kind] for kind in CHANGING))
         self.changes = rows.changes
 
     def write(self, have: dict[Operand, str]) -> list[str]:
         """The rows, after the unknowns' slopes have been put into `have`."""
         e, t = self.kernel.equations.equations, self.writer.ir
-        levels = self._with_rates(e.F)
-        many = self.changes.shape[1]
+        levels = with_rates(e.F, self.y)
+        number_count = self.changes.shape[1]
         for part in self.kernel.equations.blocks:
             jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
             if part.is_large:
@@ -154,30 +167,30 @@ class _SlopeWriter:
                 changed = ca.horzsplit(self._slopes_of(level[part.block.rows], order, part.unknowns.start))
                 if part.is_large:
                     known = self.writer.write_separately(changed, have)
-                    found = [self.writer.linear_systems.solve(each) for each in known]
+                    solutions = [self.writer.linear_systems.solve(each) for each in known]
                 else:
                     solved = [solve_by_determinants(jacobian, each) for each in changed]
-                    found = self.writer.write_separately(solved, have)
-                for number, values in enumerate(found):
-                    first = (order * many + number) * self.count
+                    solutions = self.writer.write_separately(solved, have)
+                for number, values in enumerate(solutions):
+                    first = (order * number_count + number) * self.count
                     for k, value in zip(part.unknowns, values, strict=True):
                         have["slope", first + k] = t.add_instruction(f"fneg {t.vector} {value}")
-        return self.writer.write_values(self._told(), have)
+        return self.writer.write_values(self._result_slopes(), have)
 
     def _slopes_of(self, value: ca.SX, order: int, known: int) -> ca.SX:
         """The slopes (rows, numbers) of what stands at an order, where of that order so many unknowns' slopes are
         known."""
-        found = ca.mtimes(ca.jacobian(value, self.given), self.changes)
+        slopes = ca.mtimes(ca.jacobian(value, self.arguments), self.changes)
         for k in range(order + 1):
-            many = known if k == order else self.count
-            found += ca.mtimes(ca.jacobian(value, self.unknowns[k][:many]), self.slopes[k][:many, :])
-        return ca.densify(found)
+            count = known if k == order else self.count
+            slopes += ca.mtimes(ca.jacobian(value, self.unknowns[k][:count]), self.slopes[k][:count, :])
+        return ca.densify(slopes)
 
-    def _told(self) -> list[ca.SX]:
+    def _result_slopes(self) -> list[ca.SX]:
         """The slopes of all results, row by row."""
         rows = []
         for values, width, scale in self._results():
-            for order, value in enumerate(self._with_rates(values)):
+            for order, value in enumerate(with_rates(values, self.y)):
                 slopes = self._slopes_of(value, order, self.count)
                 for first in range(0, value.numel(), width):
                     for number in range(slopes.shape[1]):
@@ -188,13 +201,13 @@ class _SlopeWriter:
         """Of points, links and pairs the values, how many numbers each has, and what each number is in units of."""
         rows, equations = self.rows, self.kernel.equations
         e, scale = equations.equations, self.kernel.symbols["scale"]
-        results, found = rows.results, []
+        results, values_and_units = rows.results, []
         if results.points:
             points = self.kernel.point_coordinates(range(len(results.points)))
-            found.append((points, 2, ca.repmat(scale, points.numel(), 1)))
+            values_and_units.append((points, 2, ca.repmat(scale, points.numel(), 1)))
         if results.links:
             angles = [ca.SX(equations.frame(link).angle) for link in results.links]
-            found.append((ca.vertcat(*angles), 1, ca.SX.ones(len(angles))))
+            values_and_units.append((ca.vertcat(*angles), 1, ca.SX.ones(len(angles))))
         if results.pairs:
             mechanism = rows.reference.mechanism
             motions = [relative_motions(mechanism)[name] for name in results.pairs]
@@ -203,11 +216,8 @@ class _SlopeWriter:
             frames = {link.name: equations.frame(link.name) for link in equations.mechanism.links}
             values = input_positions(motions, frames, split_pair_numbers(equations.mechanism.pairs, e.p), own)
             units = [scale if each.input_kind is MeasureKind.LENGTH else ca.SX(1.0) for each in motions]
-            found.append((stack_expressions(values), 1, ca.vertcat(*units)))
-        return found
-
-    def _with_rates(self, value: ca.SX) -> list[ca.SX]:
-        return [value, *time_derivatives(value, *self.y)] if self.rows.orders > 1 else [value]
+            values_and_units.append((stack_expressions(values), 1, ca.vertcat(*units)))
+        return values_and_units
 
 
 MAX_NUMBERS = 8
@@ -222,17 +232,17 @@ def march_slopes(
     Rows are as `SlopeRows` has them. Not numbers where a design did not come, or where its own numbers have no
     derivatives. None where that cannot be compiled.
     """
-    many = march.p.shape[1]
+    design_count = march.p.shape[1]
     groups = list(split_into_blocks(len(results.numbers), MAX_NUMBERS))
-    out = allocate_aligned(len(march.input_offsets), results.row_count, many)
+    out = allocate_aligned(len(march.input_offsets), results.row_count, design_count)
     for group in groups:
-        own = results._replace(numbers=results.numbers[group])
-        found = out if len(groups) == 1 else allocate_aligned(len(out), own.row_count, many)
-        if not _march_group(slope_rows(reference, own), march, values, found):
+        group_results = results._replace(numbers=results.numbers[group])
+        group_out = out if len(groups) == 1 else allocate_aligned(len(out), group_results.row_count, design_count)
+        if not _march_group(slope_rows(reference, group_results), march, values, group_out):
             return None
-        if found is not out:
-            for whole, part in zip(results.split_rows(out), own.split_rows(found), strict=True):
-                whole[:, :, group] = part
+        if group_out is not out:
+            for target, part in zip(results.split_rows(out), group_results.split_rows(group_out), strict=True):
+                target[:, :, group] = part
     return out
 
 
@@ -244,8 +254,8 @@ def slope_rows(reference: ReferenceDesign, results: SlopeResults) -> SlopeRows:
 
 def _march_group(rows: SlopeRows, march: DesignBatch, values: Mapping[str, Array], out: Array) -> bool:
     """Fill out; whether it could be compiled."""
-    many = march.p.shape[1]
-    places, numbers = rows.design_numbers(values, many)
+    design_count = march.p.shape[1]
+    places, numbers = rows.design_numbers(values, design_count)
     zeros = {each for each in march.zeros if each[0] == "p"}
     zeros |= {("q", k) for k in rows.zero_places if not places[k].any()}
     batch = march._replace(
@@ -256,9 +266,8 @@ def _march_group(rows: SlopeRows, march: DesignBatch, values: Mapping[str, Array
         stops=None,
         results=rows,
     )
-    told = np.zeros(many, dtype=int)
     try:
-        run_designs(batch, out, told)
+        run_designs(batch, out, np.zeros(design_count, dtype=int))
     except UnsupportedOperation:
         return False
     return True

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.design_arrays import read_designs, with_design_values
-from planar.batch.general_path import OUTCOMES, GridMotion, point_rows, run_design
-from planar.batch.gradients.native_gradient import padded_width, prepare_native_gradient
-from planar.batch.prepare.native_run import NativeRuns
-from planar.batch.prepare.run_calls import ALL_SOLVED, STATUS_OF_ENDING, UNSURE
+from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
+from planar.batch.general_path import OUTCOMES, point_rows, run_design
+from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
+from planar.batch.prepare.compiled_runs import CompiledRuns, address_of, prepare_runs
+from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE, padded_width
 from planar.batch.reference_design import ReferenceDesign
-from planar.derivatives.design_equations import design_equations
 from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
 from planar.derivatives.parameters import Parameters
 from planar.derivatives.result_slopes import tied_dimensions
@@ -25,7 +22,6 @@ from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, Outcome, join_names, suggest_name
 from planar.foundation.jets import Scalar
 from planar.foundation.short_repr import short_repr
-from planar.model.mechanism import Mechanism
 
 ORDERS = ("position", "velocity", "acceleration")
 """What a run tells of its points, in the order of its rows."""
@@ -97,12 +93,6 @@ def _read_array(given: Any, place: str, shape: tuple[int, int]) -> Array:
     return array
 
 
-def check_finite(weights: WeightRows) -> None:
-    """Refuse weights that are no numbers. Raises BadInput."""
-    if not all(np.isfinite(each).all() for each in weights.arrays):
-        raise BadInput("weights", "a number here is not finite")
-
-
 def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[str, ...]:
     """The numbers by which derivatives are wanted; all where none are named. Raises BadInput."""
     known = tuple(known)
@@ -116,14 +106,32 @@ def read_names(of: Sequence[str] | str | None, known: Iterable[str]) -> tuple[st
     return names
 
 
-class GeneralGradients:
-    """Gradients of the runs of one linkage over points and rates.
+MAX_KEPT_SUMS = 8
+"""Choices of weighted rows whose functions are kept."""
+MAX_BLOCK_NUMBERS = 2**22
+"""Weights that are laid out at once."""
 
-    `names`: the numbers by which there are derivatives, as `planar.gradient` has them; `bound`: those that cannot
-    change alone. Raises BadInput where derivatives are not told of a structure.
+
+class RunGradients:
+    """Gradients of sums over the positions (steps + 1,) of a run of one linkage.
+
+    The run starts and stops by itself (None) or at the ends of its `span`. `names`: the numbers by which there are
+    derivatives, as `planar.gradient` has them; `bound`: those that cannot change alone. Raises BadInput for a structure
+    without derivatives.
     """
 
-    def __init__(self, reference: ReferenceDesign, points: tuple[str, ...], rates: bool):
+    def __init__(
+        self,
+        reference: ReferenceDesign,
+        points: tuple[str, ...],
+        rates: bool,
+        positions: Array,
+        span: tuple[float | None, float | None],
+    ):
+        if reference.is_sliding and span[1] is None:
+            raise BadInput(
+                "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
+            )
         self.reference, self.points, self.rates = reference, points, rates
         self.parameters = Parameters(reference.mechanism)
         if not reference.functions.is_square:
@@ -133,61 +141,118 @@ class GeneralGradients:
                 "give derivatives a mechanism without the surplus pairs",
             )
         self.names = self.parameters.names
+        self.bound = frozenset(tied_dimensions(reference.mechanism))
+        self._positions, self._span = positions, span
+        self._width = padded_width(len(positions))
+        self.compiled: dict[tuple[int, ...], CompiledRuns | None] = {}
+        "by the rows that are weighted; None where there is no machine code"
+        self._bound = [k for k, name in enumerate(self.names) if name in self.bound]
+        # inputs that stand still in a run have no rates, despite their numbers
+        standing = {each.pair for each in reference.mechanism.inputs} - {reference.pair}
+        rates_of_standing = {f"{name}.{rate}" for name in standing for rate in ("velocity", "acceleration")}
+        self._unused = [k for k, name in enumerate(self.names) if name in rates_of_standing]
+        self._solved = np.zeros(len(positions), dtype=np.int8)
+        self._solved.flags.writeable = False
 
-    @cached_property
-    def bound(self) -> frozenset[str]:
-        """The numbers that cannot change alone."""
-        return frozenset(tied_dimensions(self.reference.mechanism))
+    def gradient(self, weights: WeightRows, values: Mapping[str, float]) -> tuple[float, list[float], IntArray]:
+        """The weighted sum of a design, its derivatives (names,), and the status of every position. Raises BadInput."""
+        compiled = self._compiled_sums(weights.rows)
+        result = None if compiled is None else self._run_compiled(compiled, weights, values)
+        if result is not None:
+            return result
+        if not all(np.isfinite(array).all() for array in weights.arrays):
+            raise BadInput("weights", "a number here is not finite")
+        if values:
+            read_designs(self.reference.mechanism, values)
+        return self._solve_gradient(weights, values)
 
-    @cached_property
-    def still(self) -> Array:
-        """Of `names` the rates of inputs that stand still in a run (names,), whatever their numbers say."""
-        pair = self.reference.pair
-        given = {each.pair for each in self.reference.mechanism.inputs} - {pair}
-        rates = {f"{name}.{rate}" for name in given for rate in ("velocity", "acceleration")}
-        return np.array([name in rates for name in self.names])
+    def slopes_of_designs(self, rows: tuple[int, ...], names: tuple[str, ...], designs: Array, weights: Array) -> Array:
+        """The derivatives (designs, `self.names`) of sums of these rows, of many designs (designs, names) with weights
+        (designs, pairs of rows, steps + 1, 2) each. Raises BadInput."""
+        slopes = np.zeros((len(designs), len(self.names)))
+        compiled = self._compiled_sums(rows)
+        bound = None if compiled is None or compiled.can_misfit else compiled.bind(names)
+        for block in split_into_blocks(len(designs), max(MAX_BLOCK_NUMBERS // max(weights[:1].size, 1), 1)):
+            block_designs, block_weights = designs[block], weights[block]
+            is_sure = np.zeros(len(block_designs), dtype=bool)
+            if bound is not None:
+                padded = np.empty((*block_weights.shape[:2], self._width, 2))
+                padded[:, :, : block_weights.shape[2]] = block_weights
+                sums, ending = run_designs(bound, block_designs, padded, 1 + len(self.names))
+                is_sure = (ending != UNSURE) & np.isfinite(sums).all(axis=1)
+                slopes[block][is_sure] = sums[is_sure, 1:]
+            for k in np.flatnonzero(~is_sure):
+                values = dict(zip(names, block_designs[k].tolist(), strict=True))
+                slopes[block.start + k] = self.gradient(WeightRows(rows, tuple(block_weights[k])), values)[1]
+        slopes[:, self._bound] = np.nan
+        return slopes
 
-    def run(
-        self, values: Mapping[str, float], start: float | None, stop: float | None, steps: int
-    ) -> tuple[Mechanism, GridMotion]:
-        """The motion of a design over a range, as `planar.prepared` has it."""
+    def _run_compiled(
+        self, compiled: CompiledRuns, weights: WeightRows, values: Mapping[str, float]
+    ) -> tuple[float, list[float], IntArray] | None:
+        """The same by compiled code; None where it is not sure."""
+        # whole vectors of positions; what is behind the last one is not read
+        rows, count = np.empty((len(weights.arrays), self._width, 2)), len(self._solved)
+        for k, array in enumerate(weights.arrays):
+            rows[k, :count] = array
+        result = compiled(values, address_of(rows))
+        if result is None:
+            return None
+        numbers, ending, end = result
+        sums = numbers.ravel()[: 1 + len(self.names)].tolist()
+        status: IntArray = self._solved
+        if ending != ALL_SOLVED:
+            status = np.zeros(len(self._positions), dtype=np.int8)
+            status[end:] = STATUS_OF_ENDING[ending]
+            if not end:
+                sums = [0.0] * len(sums)
+        value, *slopes = sums
+        if not isfinite(sum(slopes, value)):
+            return None
+        for k in self._bound:
+            slopes[k] = np.nan
+        return value, slopes, status
+
+    def _compiled_sums(self, rows: tuple[int, ...]) -> CompiledRuns | None:
+        """The compiled gradients of sums of these rows; None where there are none."""
+        if rows not in self.compiled:
+            if len(self.compiled) >= MAX_KEPT_SUMS:
+                self.compiled.clear()
+            writer, may_shift = GradientWriter(self.reference, self.points, rows), self._span == (None, None)
+            self.compiled[rows] = prepare_runs(self.reference, self._positions, may_shift, writer.compile)
+        return self.compiled[rows]
+
+    def _solve_gradient(self, weights: WeightRows, values: Mapping[str, float]) -> tuple[float, list[float], IntArray]:
+        """The same by the motion of the design."""
         mechanism = with_design_values(self.reference.mechanism, values)
+        start, stop = self._span
         begin = float(mechanism.inputs[self.reference.running_index].position) if start is None else float(start)
-        grid = begin + (2.0 * np.pi if stop is None else stop - begin) * np.linspace(0.0, 1.0, steps + 1)
-        return mechanism, run_design(mechanism, self.reference.pair, grid)
-
-    def gradient(
-        self,
-        weights: WeightRows,
-        values: Mapping[str, float],
-        start: float | None,
-        stop: float | None,
-    ) -> tuple[float, Array, IntArray]:
-        """The weighed sum, its derivatives (names,), and the status of every position (steps + 1,)."""
-        mechanism, found = self.run(values, start, stop, len(weights.arrays[0]) - 1)
-        status: IntArray = np.array(found.status)
-        if found.motion is None or not found.many:
-            return 0.0, np.where([name in self.bound for name in self.names], np.nan, 0.0), status
-        motion, solved = found.motion, slice(found.many)
-        coordinates = constraint_elements(mechanism).coordinates(motion)[: 3 if self.rates else 1]
-        numbers = [value_at(mechanism, dimension.address) for dimension in self.parameters.dimensions]
-        kinematics = KinematicSlopes(self.parameters, [rates[solved] for rates in coordinates], values=numbers)
-        w = np.hstack(weights.arrays)[solved]
-        rows = self._rows(kinematics.motion)
-        shape = len(w), len(self.names)
-        slopes = np.zeros(shape)
-        for row, weight in zip(weights.rows, w.T, strict=True):
-            slopes += weight[:, None] * result_array(rows[row], 1, shape)
-        told = point_rows(motion, self.points, self.rates)[solved][:, list(weights.rows)]
-        brings = ~kinematics.is_singular & np.isfinite(slopes).all(axis=1) & np.isfinite(told).all(axis=1)
-        status[solved][~brings] = OUTCOMES.index(Outcome.DEAD_POINT)
-        whole = slopes[brings].sum(axis=0)
-        whole[self.still] = 0.0
-        whole[[name in self.bound for name in self.names]] = np.nan
-        return float((told * w)[brings].sum()), whole, status
+        length = 2.0 * np.pi if stop is None else stop - begin
+        grid = begin + length * np.linspace(0.0, 1.0, len(self._positions))
+        result = run_design(mechanism, self.reference.pair, grid)
+        status: IntArray = np.array(result.status)
+        value, total = 0.0, np.zeros(len(self.names))
+        if result.motion is not None and result.many:
+            solved = slice(result.many)
+            coordinates = constraint_elements(mechanism).coordinates(result.motion)[: 3 if self.rates else 1]
+            numbers = [value_at(mechanism, dimension.address) for dimension in self.parameters.dimensions]
+            kinematics = KinematicSlopes(self.parameters, [order[solved] for order in coordinates], values=numbers)
+            w = np.hstack(weights.arrays)[solved]
+            rows = self._rows(kinematics.motion)
+            shape = len(w), len(self.names)
+            slopes = np.zeros(shape)
+            for row, weight in zip(weights.rows, w.T, strict=True):
+                slopes += weight[:, None] * result_array(rows[row], 1, shape)
+            points = point_rows(result.motion, self.points, self.rates)[solved][:, list(weights.rows)]
+            is_valid = ~kinematics.is_singular & np.isfinite(slopes).all(axis=1) & np.isfinite(points).all(axis=1)
+            status[solved][~is_valid] = OUTCOMES.index(Outcome.DEAD_POINT)
+            value, total = float((points * w)[is_valid].sum()), slopes[is_valid].sum(axis=0)
+        total[self._unused] = 0.0
+        total[self._bound] = np.nan
+        return value, total.tolist(), status
 
     def _rows(self, motion: CoordinateMotion) -> list[Scalar]:
-        """What a run tells, row by row: x and y of every point, then their rates."""
+        """The results of a run, row by row: x and y of every point, then their rates."""
         members = [self.reference.point_member(name) for name in self.points]
         return [
             part
@@ -195,121 +260,3 @@ class GeneralGradients:
             for link, point in members
             for part in motion.place(link, motion.shapes[link].position(point), rate)
         ]
-
-
-MAX_KEPT_SUMS = 8
-"""Choices of weighed rows whose functions are kept."""
-MAX_BLOCK_NUMBERS = 2**22
-"""Weights that are laid out at once."""
-
-
-class RunGradients:
-    """Gradients over the positions (steps + 1,) of a run that starts and stops by itself (None) or where it is told.
-
-    `names`: the numbers by which there are derivatives; `bound`: those that cannot change alone. Raises BadInput where
-    derivatives are not told of a structure.
-    """
-
-    def __init__(
-        self,
-        reference: ReferenceDesign,
-        points: tuple[str, ...],
-        rates: bool,
-        positions: Array,
-        start: float | None,
-        stop: float | None,
-    ):
-        if reference.is_sliding and stop is None:
-            raise BadInput(
-                "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
-            )
-        self._general = GeneralGradients(reference, points, rates)
-        self.names, self.bound = self._general.names, self._general.bound
-        self._positions, self._range = positions, (start, stop)
-        self._width = 0
-        self._native: dict[tuple[int, ...], NativeRuns | None] = {}
-        self._bound = [k for k, name in enumerate(self.names) if name in self.bound]
-        self._solved = np.zeros(len(positions), dtype=np.int8)
-        self._solved.flags.writeable = False
-
-    def gradient(self, weights: WeightRows, values: Mapping[str, float]) -> tuple[float, list[float], IntArray]:
-        """The weighed sum of a design, its derivatives (names,), and the status of every position. Raises BadInput."""
-        native = self._native_sums(weights.rows)
-        if native is not None:
-            told = self._run_native(native, weights, values)
-            if told is not None:
-                return told
-        check_finite(weights)
-        if values:
-            read_designs(self._general.reference.mechanism, values)
-        value, slopes, status = self._general.gradient(weights, values, *self._range)
-        return value, slopes.tolist(), status
-
-    def slopes_of_designs(self, rows: tuple[int, ...], names: tuple[str, ...], designs: Array, weights: Array) -> Array:
-        """The derivatives (designs, `self.names`) of sums of these rows, of many designs (designs, names) with weights
-        (designs, pairs of rows, steps + 1, 2) each. Raises BadInput."""
-        found = np.zeros((len(designs), len(self.names)))
-        many = max(MAX_BLOCK_NUMBERS // max(weights[:1].size, 1), 1)
-        native = self._native_sums(rows)
-        run = None if native is None or native.find_run is None else native.find_run(names)
-        for first in range(0, len(designs), many):
-            block = slice(first, first + many)
-            given, weighed = designs[block], weights[block]
-            sure = np.zeros(len(given), dtype=bool)
-            if run is not None:
-                padded = np.empty((*weighed.shape[:2], self._width, 2))
-                padded[:, :, : weighed.shape[2]] = weighed
-                sums, ending = run.run_designs(names, given, padded)
-                sure = (ending != UNSURE) & np.isfinite(sums).all(axis=1)
-                found[block][sure] = sums[sure, 1:]
-            for k in np.flatnonzero(~sure):
-                values = dict(zip(names, given[k].tolist(), strict=True))
-                found[first + k] = self.gradient(WeightRows(rows, tuple(weighed[k])), values)[1]
-        found[:, self._bound] = np.nan
-        return found
-
-    def _run_native(
-        self, native: NativeRuns, weights: WeightRows, values: Mapping[str, float]
-    ) -> tuple[float, list[float], IntArray] | None:
-        """The same by compiled code; None where it is not sure."""
-        # whole vectors of positions; what is behind the last one is not looked at
-        rows, count = np.empty((len(weights.arrays), self._width, 2)), len(self._solved)
-        for k, array in enumerate(weights.arrays):
-            rows[k, :count] = array
-        try:
-            found, ending, end = native.run(values, rows)
-        except KeyError:
-            try:
-                found, ending, end = native.run_other(values, rows)
-            except (KeyError, struct.error, TypeError):
-                return None
-        except (struct.error, TypeError):
-            return None
-        if ending == UNSURE:
-            return None
-        status: IntArray = self._solved
-        if ending != ALL_SOLVED:
-            status = np.zeros(len(self._positions), dtype=np.int8)
-            status[end:] = STATUS_OF_ENDING[ending]
-            if not end:
-                found = [0.0] * len(found)
-        value, *slopes = found
-        if not isfinite(sum(slopes, value)):
-            return None
-        for k in self._bound:
-            slopes[k] = np.nan
-        return value, slopes, status
-
-    def _native_sums(self, rows: tuple[int, ...]) -> NativeRuns | None:
-        """The compiled gradients of sums of these rows; None where there are none."""
-        if rows not in self._native:
-            if len(self._native) >= MAX_KEPT_SUMS:
-                self._native.clear()
-            self._native[rows] = self._prepare(rows)
-        return self._native[rows]
-
-    def _prepare(self, rows: tuple[int, ...]) -> NativeRuns | None:
-        self._width = padded_width(len(self._positions))
-        general, may_shift = self._general, self._range == (None, None)
-        design = design_equations(general.reference.mechanism)
-        return prepare_native_gradient(general.reference, design, general.points, rows, self._positions, may_shift)

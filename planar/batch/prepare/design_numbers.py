@@ -1,4 +1,4 @@
-"""What a run takes of a design: expressions in the numbers in which designs may differ, and their LLVM function."""
+"""What a compiled run takes of a design: expressions in the numbers in which designs may differ."""
 
 from __future__ import annotations
 
@@ -12,14 +12,10 @@ from planar.batch.design_arrays import with_design_values
 from planar.batch.design_stops import stop_ranges
 from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
 from planar.batch.march.stops import LEAST_RANGES, SURE_DISTANCE, TURN, stop_limits
-from planar.batch.prepare.run_calls import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE
 from planar.batch.reference_design import ReferenceDesign
-from planar.codegen.instructions import check_length
-from planar.codegen.llvm_ir import IRWriter
 from planar.document.dimensions import Dimension, input_numbers, link_lengths
-from planar.equations.generic_evaluation import inline_function
 from planar.equations.mechanism_numbers import equation_structure, scaled_pair_numbers
-from planar.foundation.instruction_list import InstructionList, UnsupportedOperation, required_values
+from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import Distances, Link, LinkShape, PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
@@ -49,7 +45,7 @@ class DesignNumbers:
 
     - "p" of pairs, "q" of the wanted points (by their `members`, link and point), "u1" and "u2" rates of inputs;
     - "u", "uc", "us" of the inputs at the design's own positions, "d", "dc", "ds" of how far these are from the file's;
-    - "at" of the sketched points (`sketched`) in the axes of their links, "sketch" where they are shown;
+    - "at" of the sketched points in the axes of their links (`sketched_links`), "sketch" where they are shown;
     - "stop" of stops, those of the file, whatever a design has;
     - "tolerance" of the residual check; "unit", the size in m;
     - "margin", below zero where an arm is so short, or a length so great, that rounding takes digits, and where the
@@ -74,12 +70,15 @@ class DesignNumbers:
         candidates = reference.candidates
         self._functions, self._structure = reference.functions, equation_structure(mechanism)
         self.index = {name: k for k, name in enumerate(variables)}
-        self.sketched = tuple(
-            (block.block_index, name, *candidates.first_link[name][1:])
+        sketched = [
+            (block.block_index, name)
             for block in reference.functions.equations.blocks
             for name in candidates.sketched_by_level.get(block.block_index, ())
-        )
-        shown = [part for _, name, *_ in self.sketched for part in candidates.sketch[name]]
+        ]
+        sketched_members = [candidates.first_link[name][1:] for _, name in sketched]
+        self.sketched_blocks = tuple(block for block, _ in sketched)
+        self.sketched_links = tuple(link for link, _ in sketched_members)
+        shown = [part for _, name in sketched for part in candidates.sketch[name]]
         own = [float(given.position) for given in mechanism.inputs]
         self.own_values = np.array([*(each.value for each in variables.values()), *shown, *own, reference.unit])
         self.symbols = ca.SX.sym("v", len(self.own_values))
@@ -102,7 +101,7 @@ class DesignNumbers:
         triangles = list(self._triangles(design.links))
         margins += [each for sides, _ in triangles for each in sides]
         self._add("opening", [reduce(ca.fmax, (opening for _, opening in triangles), ca.SX(-1.0))])
-        self._add("at", self._local_coordinates([(link, point) for *_, link, point in self.sketched]))
+        self._add("at", self._local_coordinates(sketched_members))
         self._add("sketch", sketch)
         lengths = [ca.fabs(each) for each, kind in zip(p, kinds, strict=True) if kind is MeasureKind.LENGTH]
         reach = reduce(ca.fmax, lengths, ca.SX(1.0))
@@ -110,6 +109,8 @@ class DesignNumbers:
         self._add("tolerance", [float(residual_tolerance(len(mechanism.links), 1.0)) * reach])
         self._add("unit", [self.unit])
         self._add("margin", [reduce(ca.fmin, margins, ca.SX(0.0))])
+        self.order: tuple[Operand, ...] = (*self.numbers, *(("value", k) for k in range(len(self.own_values))))
+        "how a run has the numbers, with the values behind them"
         self.points = [part for shape in self.shapes.values() for at in shape.points.values() for part in at]
 
     def equations(self, points: str) -> KernelEquations:
@@ -184,84 +185,3 @@ def _stop_numbers(reference: ReferenceDesign) -> tuple[tuple[Pair, ...], list[fl
     if np.any(np.where(periodic, (width < LEAST_RANGES[0]) | (width > TURN + SURE_DISTANCE), width < LEAST_RANGES[1])):
         raise UnsupportedOperation("a pair has stops that are too near to each other, or more than a turn apart")
     return tuple(pairs), stop_limits(pairs, periodic.tolist(), low, high, (-open_, open_)).numbers[:, 0].tolist()
-
-
-NUMBERS_FUNCTION = "numbers"
-SAID: Operand = ("said", 0)
-"""How a run ends before its start, see `run_endings`: it does not where all numbers are finite, and what the design's
-`margin` and `opening` say is in order."""
-
-
-REASONABLE_SIZES = (1e-99, 1e99)
-"""Of values that are given, and not nothing: others are left to those who refuse them."""
-
-
-def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
-    """The function: values of `design.symbols` to numbers in an order, and `SAID` where it stands there.
-
-    It takes all values of the file's design, how many others are given and where each of these belongs, and these.
-    Raises UnsupportedOperation.
-    """
-    t = IRWriter(1)
-    t.write_line(
-        f"define internal void @{NUMBERS_FUNCTION}(ptr %own, ptr %places, ptr %given, ptr noalias %numbers) {{"
-    )
-    t.write_label("entry")
-    is_given = write_given(t, design.symbols.numel())
-    given = [t.load(t.double_pointer("%values", str(k))) for k in range(design.symbols.numel())]
-    outputs = [*design.numbers.values(), *design.points]
-    function = ca.Function("numbers", [design.symbols], [ca.densify(ca.vertcat(*outputs))], {"cse": True})
-    check_length(function.n_instructions())
-    listing: InstructionList[int] = InstructionList()
-    inputs = [listing.add_input(k) for k in range(len(given))]
-    [wanted] = inline_function(listing, function, [inputs])
-    names: dict[int, str] = {}
-    known = {number: given[k] for k, number in enumerate(inputs)}
-    t.write_values(listing, required_values(listing, wanted), names, known)
-    values = {operand: names[k] for operand, k in zip(design.numbers, wanted, strict=False)}
-    zero = t.constant(0.0)
-    is_finite = t.compare("oeq", _write_nothing(t, [names[k] for k in wanted]), zero)
-    is_fit = t.and_flags(t.and_flags(is_given, is_finite), t.compare("oge", values["margin", 0], zero))
-    is_open = t.and_flags(is_given, t.compare("ogt", values["opening", 0], zero))
-    refused = t.select(is_open, t.constant(CANNOT_BE_ASSEMBLED), t.constant(UNSURE))
-    values[SAID] = t.select(is_fit, t.constant(ALL_SOLVED), refused)
-    for k, operand in enumerate(order):
-        if operand in values:
-            t.store(values[operand], t.double_pointer("%numbers", str(k)))
-    t.write_line("ret void")
-    t.write_line("}")
-    t.write_line("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
-    return t
-
-
-def write_given(t: IRWriter, size: int) -> str:
-    """Write the values of a design, %values (size,): those of the file's design, and the given ones in their places.
-    Return a flag that the given ones are neither too great nor too small."""
-    t.write_line(f"%values = alloca [{size} x double], align 64")
-    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
-    slot = t.allocate()
-    t.store(t.constant(1.0), slot)
-    t.write_line("%many = load i64, ptr %places")
-    t.write_line("%any = icmp sgt i64 %many, 0")
-    t.write_line("br i1 %any, label %value, label %known")
-    t.write_label("value")
-    t.write_line("%k = phi i64 [0, %entry], [%knext, %value]")
-    t.write_line("%knext = add i64 %k, 1")
-    number = t.load(t.double_pointer("%given", "%k"))
-    place = t.add_instruction("getelementptr i64, ptr %places, i64 %knext")
-    t.store(number, t.double_pointer("%values", t.add_instruction(f"load i64, ptr {place}")))
-    magnitude = t.call_intrinsic("fabs", number)
-    minimum, maximum = (t.constant(bound) for bound in REASONABLE_SIZES)
-    within = t.and_flags(t.compare("oge", magnitude, minimum), t.compare("ole", magnitude, maximum))
-    within = t.or_flags(within, t.compare("oeq", magnitude, t.constant(0.0)))
-    t.store(t.select_or_zero(within, t.load(slot)), slot)
-    t.write_line("%more = icmp slt i64 %knext, %many")
-    t.write_line("br i1 %more, label %value, label %known")
-    t.write_label("known")
-    return t.compare("oeq", t.load(slot), t.constant(1.0))
-
-
-def _write_nothing(t: IRWriter, values: Sequence[str]) -> str:
-    """Nothing, or no number where one of the values is not finite."""
-    zero = t.constant(0.0)
-    return t.add_all([zero, *(t.binary("mul", zero, each) for each in dict.fromkeys(values))])
