@@ -9,7 +9,7 @@ what else there may be from below, since squared distances never fall as blocks 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf
+from math import cos, inf
 from typing import Any
 
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
@@ -141,7 +141,8 @@ class _StartWriter(BlockJoinWriter):
 class _PositionsWriter(KernelWriter):
     """The second stage writes rows at all positions, these in the lanes, then looks for where the run ends.
 
-    The rows are the results, then counted angles, coalescences of blocks and of pairs with stops, and the residual.
+    The rows are the results, then counted angles, cosines and sines of links that carry other blocks, how near blocks
+    are to dead points and pairs to their stops, and the residual.
     """
 
     def __init__(self, design: DesignNumbers, links: tuple[str, ...] | None, rates: bool, order: tuple[Operand, ...]):
@@ -168,7 +169,11 @@ class _PositionsWriter(KernelWriter):
         self.lane = t.add_instruction(f"mul i64 %b, {LANES}")
         inputs = {operand: self.load_entry(rows_of_inputs, k) for k, operand in enumerate(self.input_operands)}
         have |= write_shifted_inputs(t, equations, inputs, have)
-        coalescences = [*(self.write_closed_form(part, have) for part in equations.blocks), *self.write_stops(have)]
+        near = [
+            *(self.write_closed_form(part, have, as_cosine=True) for part in equations.blocks),
+            *self.write_stops(have),
+        ]
+        turns = [have[part, k] for k in equations.carrying_angles for part in ("zc", "zs")]
         residuals, angles, *orders = self.write_separately(
             [equations.residuals(), self.counted_angles(), *self.output_expressions()], have
         )
@@ -177,12 +182,12 @@ class _PositionsWriter(KernelWriter):
         results = [t.binary("mul", have["unit", 0], value) for order in orders for value in order]
         if self.tells_states:
             results = [have[operand] for operand in self.state_operands()]
-        rows = (*results, *angles, *coalescences, residual)
+        rows = (*results, *angles, *turns, *near, residual)
         for k, value in enumerate(rows):
             t.store(value, self.entry_pointer("%out", k + 1))
         t.close_loop("b", blocks.lstrip("%"), "block", "check")
-        first_coalescence = 1 + len(results) + len(angles)
-        self._write_end(blocks, last, range(1 + len(results), first_coalescence), have["tolerance", 0])
+        angle_rows = range(1 + len(results), 1 + len(results) + len(angles))
+        self._write_end(blocks, last, angle_rows, have["tolerance", 0])
         return len(results), len(rows)
 
     def _write_end(self, blocks: str, last: str, angle_rows: range, tolerance: str) -> None:
@@ -226,21 +231,24 @@ class _PositionsWriter(KernelWriter):
         """Flags of positions: it is known how all is, a block is clearly open, a pair clearly beyond its stop.
 
         Between positions too no coalescence reaches one, by half as much as it bends over three of them, and no counted
-        angle goes far.
+        angle, and no link that carries other blocks, goes far.
         """
         t = self.ir
         is_first, is_early = (self._negate(t.lanes_from(self.lane, f"splat (i64 {k})")) for k in (1, 2))
         is_open = is_beyond = "zeroinitializer"
         is_sure = "splat (i1 true)"
-        row = angle_rows.stop
+        row = angle_rows.stop + 2 * len(self.equations.carrying_angles)
         for form in (*self.equations.closed_forms, *(None for _ in self.equations.stop_pairs)):
             earlier, before, current = (self._load_before(row, back) for back in (2, 1, 0))
             row += 1
             # after a block that is open itself there is no number
-            is_known = t.or_flags(write_keeps_apart(t, earlier, before, current), t.compare("uno", current, current))
+            is_cosine = form is not None and form.cosine is not None
+            keeps_apart = write_keeps_apart(t, earlier, before, current, is_cosine=is_cosine)
+            is_known = t.or_flags(keeps_apart, t.compare("uno", current, current))
             is_known = t.or_flags(is_known, is_early)
             if form is None or form.squared_arm is None:
-                is_reached = t.compare("oge", current, t.constant(CLEARLY_OPEN))
+                reached = t.binary("mul", current, current) if is_cosine else current
+                is_reached = t.compare("oge", reached, t.constant(CLEARLY_OPEN))
                 is_known = t.or_flags(is_known, is_reached)
                 is_beyond = t.or_flags(is_beyond, is_reached) if form is None else is_beyond
                 is_open = is_open if form is None else t.or_flags(is_open, is_reached)
@@ -250,6 +258,11 @@ class _PositionsWriter(KernelWriter):
         for angle_row in angle_rows:
             turn = t.binary("sub", self._load_before(angle_row, 0), self._load_before(angle_row, 1))
             is_near = t.compare("ule", t.call_intrinsic("fabs", turn), t.constant(MAX_TURN_PER_STEP))
+            is_sure = t.and_flags(is_sure, t.or_flags(is_near, is_first))
+        for turn_row in range(angle_rows.stop, angle_rows.stop + 2 * len(self.equations.carrying_angles), 2):
+            parts = [[self._load_before(turn_row + part, back) for back in (0, 1)] for part in (0, 1)]
+            along = t.add_all([t.binary("mul", *part) for part in parts])
+            is_near = t.compare("uge", along, t.constant(cos(MAX_TURN_PER_STEP)))
             is_sure = t.and_flags(is_sure, t.or_flags(is_near, is_first))
         is_closed = t.compare("ole", self._load_before(row, 0), tolerance)
         return t.and_flags(is_sure, t.or_flags(is_closed, is_open)), is_open, is_beyond
