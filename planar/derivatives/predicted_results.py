@@ -26,7 +26,7 @@ from planar.foundation.jets import sqrt
 from planar.model.mechanism import Mechanism
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 from planar.solving.position import solve
 
 

@@ -16,9 +16,8 @@ from planar.model.run_arguments import check_number, check_steps
 from planar.model.wording import quote_names
 from planar.results.motion import Motion
 from planar.solving.position import SolvedMechanism, solved_mechanism
-from planar.solving.runs.range_run import RangeRun
-from planar.solving.runs.running_input import Progress
-from planar.solving.runs.time_run import TimeRun
+from planar.solving.runs.range_run import Progress, RangeRun
+from planar.solving.runs.time_run import run_in_time
 
 """A run of so many positions of forty links takes some hundred megabytes."""
 MAX_DURATION = 1e6
@@ -94,7 +93,7 @@ def cycle(
     if is_timed:
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return _explained_run(known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration))
+        return _explained_run(known, pair, lambda: run_in_time(mechanism, int(steps), duration, branches, jerk))
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
 

@@ -16,7 +16,7 @@ from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
-from planar.solving.runs.time_run import input_law_rates
+from planar.solving.runs.continuous_run import input_law_rates
 
 Array = np.ndarray
 

@@ -267,25 +267,8 @@ def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> boo
     return guess is not None and float(np.linalg.norm(guess - here.y)) < ON_BRANCH_RATIO * abs(gone)
 
 
-class BranchCrossing(NamedTuple):
-    """The curve on either side of a change point along one way: the points where the polynomial ends."""
-
-    before: CurvePoint
-    middle: CurvePoint
-    after: CurvePoint
-    half_length: float
-    coefficients: Array
-    rank_loss: int
-
-    def arc(self, before: CurvePoint, after: CurvePoint) -> Arc:
-        """A part of it."""
-        return Arc(
-            before, after, self.middle.y, self.middle.tangent, self.half_length, self.coefficients, self.rank_loss
-        )
-
-
-def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) -> BranchCrossing | None:
-    """The polynomial of eighth degree through a change point and a point on each side, along one way through it.
+def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) -> Arc | None:
+    """The arc from one side of a change point to the other along one way through it: a polynomial of eighth degree.
 
     Its error falls with the ninth power of its length; so far that rounding is all that is left.
     """
@@ -299,16 +282,16 @@ def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) ->
         if len(ends) == 2 and all(end.tangent @ branch.tangent > 0.9 for end in ends):
             before, after = ends
             shape = fit_polynomial((before, branch, after), branch.tangent, (-1.0, 0.0, 1.0), half)
-            found = BranchCrossing(before, branch, after, half, shape, rank_loss)
-            if _fits_curve(curve, found):
-                return found
+            arc = Arc(before, after, branch.y, branch.tangent, half, shape, rank_loss)
+            if _fits_curve(curve, arc):
+                return arc
         half *= 0.5
     return None
 
 
-def _fits_curve(curve: SolutionCurve, found: BranchCrossing) -> bool:
-    arc = found.arc(found.before, found.after)
-    for x in (-0.5 * found.half_length, 0.5 * found.half_length):
+def _fits_curve(curve: SolutionCurve, arc: Arc) -> bool:
+    """Whether the polynomial of an arc beside a change point is the curve to round-off."""
+    for x in (-0.5 * arc.unit_length, 0.5 * arc.unit_length):
         rough = arc.polynomial(x)
         exact = curve.correct(rough, arc.axis)
         if exact is None or np.max(np.abs(exact - rough)) > ARC_FIT_TOLERANCE:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions
+from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
+from planar.foundation.jets import Jet, value_and_rates
+from planar.model.pairs import Pair
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.continuation.bordered_jacobian import BorderedJacobian
 from planar.solving.newton import SystemFunction, correct, correct_at_rank
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10
@@ -31,22 +35,11 @@ SHORT_REGULAR_DISTANCE = 0.25
 """rad or sizes: a distance from singular Jacobians from which on no step is shortened."""
 MAX_SOLVED_STEP = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
-
-
-class CurveSolver(Protocol):
-    """What a curve needs of a solver."""
-
-    functions: EquationFunctions
-
-    def max_residuals(self, z: Array, u: Array) -> Array:
-        """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
-
-    def max_residual(self, z: Array, u: Array) -> float:
-        """The same at one position, z (unknowns,) and u (inputs,)."""
-
-    @property
-    def tolerance(self) -> float:
-        """What the residual check lets pass."""
+DEAD_POINT_TOLERANCE = 1e-7
+"""The square root of twice what the inputs may have left (rad or sizes) of their way to where they turn back at a dead
+point to rounding; also the least rate of the inputs along the curve from which one is left."""
+RESTING_INPUT_RATE = 1e-13
+"""A rate of the inputs along the curve, for one of what is farthest out, that is rounding."""
 
 
 class CurvePoint(NamedTuple):
@@ -62,6 +55,21 @@ class CurvePoint(NamedTuple):
     def input_rate(self) -> float:
         """The rate of the inputs along the curve: positive where they go on, zero at a dead point."""
         return float(self.tangent[-1])
+
+    @property
+    def is_dead_point(self) -> bool:
+        """Whether the point is a dead point to rounding.
+
+        With rate g and second derivative b of the inputs by arc length it is g^2 / 2b before where they turn back. A
+        small rate alone does not tell: it is small as well where slides go far out for little of the inputs.
+        """
+        g, b = self.input_rate, float(self.curvature[-1])
+        is_near = g * g <= DEAD_POINT_TOLERANCE**2 * abs(b)
+        return is_near or abs(g) * max(1.0, greatest_size(self.y)) < RESTING_INPUT_RATE
+
+    def towards(self, direction: Array) -> CurvePoint:
+        """The same point, to be left less than a right angle from a direction (n + 1,)."""
+        return self if self.tangent @ direction >= 0.0 else self.reversed()
 
     def reversed(self) -> CurvePoint:
         """The same point, to be left the other way."""
@@ -108,7 +116,7 @@ class ImplicitCurve:
         many = len(y) - 1
         if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
             system = stack_row(slope, towards)
-            tangent = _solve_regular(system, append_number(np.zeros(many), 1.0))
+            tangent = _solve_regular(system, input_axis(many + 1))
             size = np.inf if tangent is None else length_of(tangent)
             if tangent is not None and size * length_of(towards) < MAX_TANGENT_RATIO:
                 tangent /= size
@@ -175,9 +183,10 @@ class SolutionCurve(ImplicitCurve):
     Lengths are in sizes of the mechanism, angles in rad. J = dF/dy loses rank at change points.
     """
 
-    def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
-        self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
-        self._is_along_input = len(way) == 1 and way[0] == 1.0
+    def __init__(self, solver: PreparedMechanism, start: Array, direction: Array):
+        self.solver, self.functions, self.p = solver, solver.functions, solver.inputs.p
+        self.start, self.input_direction = start, direction
+        self._is_along_input = len(direction) == 1 and direction[0] == 1.0
 
     def inputs(self, y: Array) -> Array:
         """The inputs (inputs,) at a point, or at points (points, inputs)."""
@@ -292,12 +301,35 @@ def _solve_regular(system: Array, known: Array) -> Array | None:
         return None
 
 
+def input_axis(size: int) -> Array:
+    """The direction (n + 1,) in which the inputs go on while the unknowns rest."""
+    return append_number(np.zeros(size - 1), 1.0)
+
+
+def pair_motions_at(pairs: Sequence[Pair], curve: SolutionCurve, point: CurvePoint) -> Array:
+    """Position, first and second derivative by arc length of the relative motions at pairs (pairs, 3), SI."""
+    if not pairs:
+        return np.zeros((0, 3))
+    setup = curve.solver
+    rates, second = curve.widen_direction(point.tangent), curve.widen_direction(point.curvature)
+    motion = curve.functions.kinematics(curve.unknowns_and_inputs(point.y), rates, second, curve.p)
+    bodies = dict.fromkeys(link for pair in pairs for link in pair.bodies)
+    joined = {pair.name: setup.pairs[pair.name] for pair in pairs if pair.name in setup.pairs}
+    names = [(link, part) for link in bodies for part in FRAME_PARTS]
+    names += [(name, part) for name, pair in joined.items() for part, _ in pair.coordinate_kinds]
+    columns = [setup.column[name] for name in names if name in setup.column]
+    parts = np.stack([motion.w, motion.w1, motion.w2], axis=1)[columns] * setup.scale[columns, None]
+    jets = {column: Jet(*rates) for column, rates in zip(columns, parts.tolist(), strict=True)}
+    frames, own = frames_from_coordinates(jets, setup.column, bodies, joined)
+    return np.array([value_and_rates(pair.input_position_at(setup.shapes, frames, own)) for pair in pairs], dtype=float)
+
+
 class Arc(NamedTuple):
     """The curve from one point to the next: a polynomial in how far one is along an axis.
 
     Between two points it is near the curve and `SolutionCurve.correct` carries it there. Beside a change point it is
-    the curve to round-off, and nothing can correct it: there the slope is singular. `lost` is how much rank it lacks at
-    that change point, and 0 where there is none.
+    the curve to round-off, and nothing can correct it: there the slope is singular. `rank_loss` is how much rank it
+    lacks at that change point, and 0 where there is none.
     """
 
     before: CurvePoint
@@ -306,7 +338,7 @@ class Arc(NamedTuple):
     axis: Array
     unit_length: float
     coefficients: Array
-    "coefficients (degree + 1, n + 1), of powers of the distance over `half`"
+    "coefficients (degree + 1, n + 1), of powers of the distance over `unit_length`"
     rank_loss: int
 
     @property
@@ -317,8 +349,11 @@ class Arc(NamedTuple):
     @property
     def ends(self) -> tuple[float, float]:
         """How far its two ends are along the axis."""
-        first, last = (float(self.axis @ (point.y - self.origin)) for point in (self.before, self.after))
-        return first, last
+        return self.place(self.before.y), self.place(self.after.y)
+
+    def place(self, y: Array) -> float:
+        """How far a point is along the axis."""
+        return float(self.axis @ (y - self.origin))
 
     def polynomial(self, x: float, order: int = 0) -> Array:
         """The polynomial, or a derivative of it (n + 1,), so far along the axis."""

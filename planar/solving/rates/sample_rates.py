@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY
+from planar.solving.continuation.run_samples import BranchRates, InputRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import regularity
 
-if TYPE_CHECKING:
-    from planar.solving.continuation.path_pieces import BranchRates
-
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
 DIRECTION_TOLERANCE = 1e-9
 """A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
-
-
-class InputRates(NamedTuple):
-    """Positions of the inputs over a run, with their first, second and third rates, each (samples, inputs)."""
-
-    u: Array
-    u1: Array
-    u2: Array
-    u3: Array
 
 
 class SampleRates(NamedTuple):

@@ -10,16 +10,13 @@ import numpy as np
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import value_and_rates
-from planar.model.pairs import MeasureKind
+from planar.model.mechanism import Input
 from planar.results.motion import Motion
 from planar.results.records import Limit
-from planar.solving.continuation.fast_path import FastSamples
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.path_pieces import BranchRates
+from planar.solving.continuation.run_samples import InputRates, RunSamples, join_runs
 from planar.solving.position import PositionSolver, solved_mechanism
-from planar.solving.rates.sample_rates import InputRates
-from planar.solving.runs.samples import RunSamples, build_motion
-from planar.solving.runs.time_run import input_law_rates
+from planar.solving.runs.samples import build_motion
 
 PLACE_TOLERANCE = 1e-12
 """Of a run: places nearer to each other are one."""
@@ -40,7 +37,7 @@ class ContinuousRun:
         self.name = motion.running_input
         self.known = solved_mechanism(motion.mechanism)
         self.solver = self.known.solver
-        self.scale = np.array([_input_scale(self.solver, name) for name in motion.inputs])
+        self.scale = _input_scale(self.solver)
         position = motion.inputs[self.name].position
         steps = np.diff(position)
         self.rows: Array = (
@@ -81,29 +78,11 @@ class ContinuousRun:
         order = np.argsort(places, kind="stable")
         back = np.argsort(order, kind="stable")
         targets = places[order]
-        parts = [self._follow(part) for part in self._divided(targets) if len(part)]
-        samples = [part.fast_samples for part in parts]
-        fast = (
-            FastSamples(
-                np.concatenate([part.coordinate_rates for part in samples if part]),
-                np.concatenate([part.is_sure for part in samples if part]),
-                max(part.residual for part in samples if part),
-            )
-            if all(samples)
-            else None
-        )
-        z = np.vstack([part.z for part in parts])[back]
-        if fast is not None:
-            fast = FastSamples(fast.coordinate_rates[back], fast.is_sure[back], fast.residual)
-        local: dict[int, BranchRates] = {}
-        first = 0
-        for part in parts:
-            local |= {int(back[first + row]): rates for row, rates in part.branch_rates.items()}
-            first += len(part.z)
-        run = RunSamples(z, self._input_rates(places), branch_rates=local, fast_samples=fast)
+        run = join_runs([self._follow(part) for part in self._divided(targets) if len(part)]).select(back)
+        run = run._replace(inputs=self._input_rates(places), passed=(), nearby=())
         time = None if self.motion.time is None else places
         forks = () if self.motion.course is None else self.motion.course.fork_positions
-        path = _PathAtPlaces(frozenset(local), forks, z, self.motion)
+        path = _PathAtPlaces(frozenset(run.branch_rates), forks, run.z, self.motion)
         motion = build_motion(self.solver, self.known.remarks, run, False, path, time)
         if len(motion) < len(places):  # a pair that may stay open does so by too much
             raise NoAnswer(motion.outcome, motion.reason)
@@ -156,7 +135,7 @@ class ContinuousRun:
         if not brackets:
             return np.zeros(0)
         a, b, fa, fb, target = np.array(brackets).T
-        return self.distinct(self._refine(signal, (a, b), (fa, fb), target))
+        return self.distinct(self.roots(signal, (a, b), (fa, fb), target))
 
     def distinct(self, places: Iterable[float]) -> Array:
         """Places inside the run in their order, those that differ by rounding once."""
@@ -164,10 +143,11 @@ class ContinuousRun:
         inside = np.sort([place for place in places if self.low + room < place < self.high - room])
         return inside[np.diff(inside, prepend=-np.inf) > room] if len(inside) else inside
 
-    def _refine(
+    def roots(
         self, signal: Callable[[Motion], Array], ends: tuple[Array, Array], values: tuple[Array, Array], target: Array
     ) -> Array:
-        """Roots in brackets, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
+        """Where a signal reaches its targets between two places at which its distances from them are known and differ
+        in sign, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
         a, b, fa, fb = (part.copy() for part in (*ends, *values))
         room = 1e-15 * max(abs(self.low), abs(self.high))
         for step in range(MAX_ROOT_STEPS):
@@ -206,8 +186,7 @@ class ContinuousRun:
     def _input_rates(self, places: Array) -> InputRates:
         motion = self.motion
         if motion.time is not None:
-            parts = np.array([input_law_rates(driven, places) for driven in motion.mechanism.inputs])
-            return InputRates(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
+            return timed_inputs(self.solver, places)
         k = np.clip(np.searchsorted(self.rows, places, side="right") - 1, 0, len(self.rows) - 2)
         along = np.where(np.isin(k, self.turning_rows), k + 1, k)  # a turning row has the rates of the way before it
         inputs = motion.inputs.values()
@@ -237,17 +216,10 @@ class ContinuousRun:
         between = self.rows[(self.rows > targets[0]) & (self.rows < targets[-1])]
         places = np.sort(np.concatenate([targets, between]))
         rates = self._input_rates(np.concatenate([[self.rows[base]], places]))
-        path = follow_samples(self.solver, self.solver.inputs.p, self.z[base], rates.u, rates=(rates.u1, rates.u2))
-        if path.stopped is not None:
-            raise path.stopped
-        chosen = 1 + np.searchsorted(places, targets)
-        index = {int(row): k for k, row in enumerate(chosen)}
-        branch_rates = {index[row]: part for row, part in path.branch_rates.items() if row in index}
-        fast = path.fast_samples
-        if fast is not None:
-            fast = FastSamples(fast.coordinate_rates[chosen], fast.is_sure[chosen], fast.residual)
-        target_rates = InputRates(*(part[chosen] for part in rates))
-        return RunSamples(path.z[chosen], target_rates, branch_rates=branch_rates, fast_samples=fast)
+        run = follow_samples(self.solver, self.z[base], rates)
+        if run.stopped is not None:
+            raise run.stopped
+        return run.select(1 + np.searchsorted(places, targets))
 
 
 @dataclass(eq=False)
@@ -264,8 +236,24 @@ class _PathAtPlaces:
         return () if self.source.course is None else self.source.course.limits(self.source)
 
 
-def _input_scale(solver: PositionSolver, name: str) -> float:
-    return solver.unit if solver.relative_motions[name].input_kind is MeasureKind.LENGTH else 1.0
+def timed_inputs(solver: PositionSolver, time: Array) -> InputRates:
+    """The inputs at times (s), each by its law, or at the file's velocity and acceleration."""
+    parts = np.array([input_law_rates(driven, time) for driven in solver.mechanism.inputs])
+    return InputRates(*(part.T / _input_scale(solver) for part in parts.transpose(1, 0, 2)))
+
+
+def input_law_rates(driven: Input, time: Array) -> Array:
+    """Position and first, second and third rate of an input (4, times)."""
+    if driven.law is not None:
+        return np.asarray(driven.law.evaluate(time, driven.position, driven.velocity))
+    velocity = driven.velocity + driven.acceleration * time
+    position = driven.position + driven.velocity * time + 0.5 * driven.acceleration * time**2
+    return np.array([position, velocity, np.full_like(time, driven.acceleration), np.zeros_like(time)])
+
+
+def _input_scale(solver: PositionSolver) -> Array:
+    """What the inputs of the solver are in units of (inputs,): m or rad."""
+    return np.where(solver.structure.input_slides, solver.unit, 1.0)
 
 
 def _repeated(level: float, period: float, low: float, high: float) -> list[float]:

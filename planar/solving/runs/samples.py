@@ -2,129 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.equations.acceptance import InputSamples
-from planar.foundation.arrays import Array, IntArray
-from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.arrays import Array
+from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import FollowedPath, Motion
 from planar.results.records import InputMotion, ThirdRates
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR
-from planar.solving.continuation.change_point_remarks import change_point_remarks
-from planar.solving.continuation.fast_path import FastSamples, concatenate_samples
-from planar.solving.continuation.path import FollowedSamples
-from planar.solving.continuation.path_pieces import BranchRates, PathBifurcation
-from planar.solving.continuation.predictor_corrector import NearbyBifurcation
+from planar.solving.continuation.events import change_point_remarks
+from planar.solving.continuation.run_samples import InputRates, RunSamples
 from planar.solving.diagnosis import refusals
 from planar.solving.lazy_frames import lazy_frames
 from planar.solving.position import PositionSolver
 from planar.solving.rates.accuracy import AccuracyDoubts
-from planar.solving.rates.sample_rates import InputRates, sample_rates
-
-
-class RunSamples(NamedTuple):
-    """Unknowns at the rows of a run (rows, unknowns), inputs with their rates, the rows that are dead points, rates
-    where the slope is singular, and what was met on the way."""
-
-    z: Array
-    inputs: InputRates
-    dead_points: tuple[int, ...] = ()
-    branch_rates: Mapping[int, BranchRates] = MappingProxyType({})
-    passed: tuple[PathBifurcation, ...] = ()
-    nearby: tuple[NearbyBifurcation, ...] = ()
-    outcome: Outcome = Outcome.SOLVED
-    reason: str = ""
-    fast_samples: FastSamples | None = None
-
-    def select(self, some: IntArray) -> RunSamples:
-        """Some of the rows, in their order, of which nothing is told."""
-        where = {int(row): k for k, row in enumerate(some)}
-        return self._replace(
-            z=self.z[some],
-            inputs=InputRates(*(each[some] for each in self.inputs)),
-            dead_points=tuple(where[row % len(self.z)] for row in self.dead_points),
-            branch_rates={where[row]: each for row, each in self.branch_rates.items()},
-            fast_samples=None,
-        )
-
-    def with_problem(self, problem: NoAnswer | None) -> RunSamples:
-        """The same rows, of a run that stopped."""
-        return self if problem is None else self._replace(outcome=problem.outcome, reason=problem.reason)
-
-
-def run_samples(found: FollowedSamples, given: InputRates, dead: tuple[int, ...] = ()) -> RunSamples:
-    """The rows of a run that was followed in one piece."""
-    part = InputRates(*(each[: len(found.z)] for each in given))
-    return RunSamples(
-        found.z, part, dead, found.branch_rates, found.passed, found.nearby, fast_samples=found.fast_samples
-    )
-
-
-def splice_runs(down: FollowedSamples, up: FollowedSamples) -> FollowedSamples:
-    """Two runs from one position, which is no row, as one through it: the first backwards, then the second."""
-    back = len(down.z) - 1
-    local = {back - row: each for row, each in down.branch_rates.items() if row}
-    local |= {back + row - 1: each for row, each in up.branch_rates.items() if row}
-    return FollowedSamples(
-        np.vstack([down.z[:0:-1], up.z[1:]]),
-        down.general_count + up.general_count,
-        up.stopped,
-        up.last_position,
-        local,
-        (*down.passed[::-1], *up.passed),
-        (*down.nearby, *up.nearby),
-        concatenate_samples(
-            down.fast_samples and down.fast_samples.cut(slice(None, 0, -1)),
-            up.fast_samples and up.fast_samples.cut(slice(1, None)),
-        ),
-    )
-
-
-def drop_first(found: FollowedSamples) -> FollowedSamples:
-    """A run without its first position, which is no row."""
-    local = {row - 1: each for row, each in found.branch_rates.items() if row}
-    return found._replace(
-        z=found.z[1:], branch_rates=local, fast_samples=found.fast_samples and found.fast_samples.cut(slice(1, None))
-    )
-
-
-def join_runs(first: RunSamples, second: RunSamples) -> RunSamples:
-    """Two runs one after the other, the second of which starts in the last row of the first."""
-    shift = len(first.z) - 1
-    given = InputRates(*(np.vstack([a, b[1:]]) for a, b in zip(first.inputs, second.inputs, strict=True)))
-    return first._replace(
-        z=np.vstack([first.z, second.z[1:]]),
-        inputs=given,
-        dead_points=tuple(sorted({*first.dead_points, *(row + shift for row in second.dead_points)})),
-        branch_rates={**first.branch_rates, **{row + shift: each for row, each in second.branch_rates.items() if row}},
-        passed=(*first.passed, *second.passed),
-        nearby=(*first.nearby, *second.nearby),
-        outcome=second.outcome,
-        reason=first.reason or second.reason,
-        fast_samples=concatenate_samples(
-            first.fast_samples, second.fast_samples and second.fast_samples.cut(slice(1, None))
-        ),
-    )
-
-
-def reverse_run(run: RunSamples) -> RunSamples:
-    """The same run backwards: velocities turn round, accelerations stay, as in a film run backwards."""
-    last = len(run.z) - 1
-    u, u1, u2, u3 = (each[::-1] for each in run.inputs)
-    return run._replace(
-        z=run.z[::-1],
-        inputs=InputRates(u, -u1, u2, -u3),
-        dead_points=tuple(sorted(last - row for row in run.dead_points)),
-        branch_rates={last - row: each for row, each in run.branch_rates.items()},
-        fast_samples=run.fast_samples and run.fast_samples.reversed(),
-    )
+from planar.solving.rates.sample_rates import sample_rates
 
 
 def build_motion(
@@ -139,28 +36,26 @@ def build_motion(
     if solver.equations.open_rows:
         run = _rows_within_misfit(solver, run)
         time = time if time is None else time[: len(run.z)]
-    told = run.fast_samples if not with_jerk else None
+    unsure = np.arange(len(run.z)) if with_jerk else np.flatnonzero(~run.is_sure)
+    parts, residual = list(run.coordinate_rates.transpose(1, 0, 2)), run.residual
     remarks: tuple[str, ...] = ()
-    if told is not None and told.is_sure.all():
-        parts, residual = list(told.coordinate_rates.transpose(1, 0, 2)), told.residual
-    elif told is not None:
-        rest = np.flatnonzero(~told.is_sure)
-        some = run.select(rest)
-        looked_at, residual, remarks = _rates_at_dead_points(solver, some) or _checked_rates(
-            solver, some, with_jerk, bool(told.is_sure.any())
-        )
-        whole = told.coordinate_rates.copy()
-        whole[rest] = np.stack(looked_at, axis=1)
-        parts, residual = list(whole.transpose(1, 0, 2)), max(residual, told.residual)
-    else:
-        parts, residual, remarks = _checked_rates(solver, run, with_jerk)
-    inputs = {each.pair: _input_motion(solver, run.inputs, index) for index, each in enumerate(solver.mechanism.inputs)}
+    if unsure.size:
+        rest, is_part = run.select(unsure), unsure.size < len(run.z)
+        checked = None if with_jerk else _rates_at_dead_points(solver, rest)
+        examined, residual, remarks = checked or _checked_rates(solver, rest, with_jerk, is_part)
+        if is_part:
+            parts, residual = [part.copy() for part in parts], max(residual, run.residual)
+            for part, rates in zip(parts, examined, strict=True):
+                part[unsure] = rates
+        else:
+            parts = examined
+    names = [driven.pair for driven in solver.mechanism.inputs]
     frames, own = lazy_frames(solver, parts[:3])
     return Motion(
         mechanism=solver.mechanism,
-        inputs=inputs,
+        inputs=dict(zip(names, _input_motions(solver, run.inputs), strict=True)),
         outcome=run.outcome,
-        reason=run.reason,
+        reason=run.reason or (run.stopped.reason if run.stopped is not None else ""),
         residual=residual,
         remarks=(*assembly_remarks, *change_point_remarks(solver, run.passed, run.nearby), *remarks),
         frames=frames,
@@ -186,12 +81,7 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
     assert refusal is not None
     if not beyond[0]:
         raise refusal
-    kept = np.arange(beyond[0])
-    some = run._replace(
-        dead_points=tuple(row for row in run.dead_points if row % len(run.z) < len(kept)),
-        branch_rates={row: each for row, each in run.branch_rates.items() if row < len(kept)},
-    )
-    return some.select(kept).with_problem(refusal)
+    return run.select(np.arange(beyond[0]))._replace(stopped=refusal, reason="")
 
 
 class _CheckedRates(NamedTuple):
@@ -217,7 +107,7 @@ def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> _CheckedRa
     return _CheckedRates([*w], residual)
 
 
-def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool = False) -> _CheckedRates:
+def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool) -> _CheckedRates:
     """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer. The rows
     may be a part of a run whose other rows have rates."""
     z, given = run.z, run.inputs
@@ -237,8 +127,8 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
         remarks += _remove_inexact_rates(solver, given, parts, doubt, is_part)
     frames, own = lazy_frames(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
-    inputs = [_input_motion(solver, given, index) for index in range(len(solver.mechanism.inputs))]
-    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, [Jet(*each) for each in inputs])
+    inputs = [Jet(*rates) for rates in _input_motions(solver, given)]
+    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, inputs)
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
         of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
         wrong = of_rows > 1e3 * solver.tolerance
@@ -300,6 +190,7 @@ def _remove_inexact_rates(
     return tuple(remarks)
 
 
-def _input_motion(solver: PositionSolver, given: InputRates, index: int) -> InputMotion:
-    size = solver.unit if solver.is_sliding(solver.mechanism.inputs[index].pair) else 1.0
-    return InputMotion(*(part[:, index] * size for part in given[:3]))
+def _input_motions(solver: PositionSolver, inputs: InputRates) -> list[InputMotion]:
+    """The inputs over a run (rad or m)."""
+    sizes = [solver.unit if slides else 1.0 for slides in solver.structure.input_slides]
+    return [InputMotion(*(rate[:, k] * size for rate in inputs[:3])) for k, size in enumerate(sizes)]
