@@ -39,8 +39,8 @@ from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
+    from planar.solving.continuation.bifurcation import SingularRates
     from planar.solving.continuation.run_samples import BranchRates, InputRates
-    from planar.solving.continuation.singular_rates import SingularRates
     from planar.solving.continuation.solution_curve import CurvePoint
 
 
@@ -252,7 +252,7 @@ class PositionSolver(PreparedMechanism):
                 return regular[0].state(regular[1], remarks)
             if not isinstance(problem, SingularPosition):
                 raise
-            from planar.solving.continuation.singular_rates import singular_rates  # few positions are of this kind
+            from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
 
             through = singular_rates(self, z)
             state = through and self._singular_state(through, remarks)

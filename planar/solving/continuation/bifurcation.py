@@ -28,6 +28,7 @@ from planar.solving.continuation.second_order import (
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
@@ -200,18 +201,24 @@ class _BranchConditions:
         self.null, self.left_null = self.vt[self.rank :].T, self.u[:, self.rank :]
         self.forms = curve.weighted_hessian_products(y, self.left_null, self.null) @ self.null
 
-    def branch_along(self, c: Array) -> CurvePoint | None:
-        """The way with tangent null c and its second derivative; None where the third order leaves it open."""
+    def branch_along(self, c: Array, sideways: Array | float = 0.0) -> CurvePoint | None:
+        """The way with tangent null c and its second derivative; None where the third order leaves it open.
+
+        `sideways` is the second derivative of the inputs (inputs,) by how far they are on their straight line, where
+        they bend off it.
+        """
         curve, rank = self.curve, self.rank
         v = self.null @ c
-        base = -self.vt[:rank].T @ ((self.u[:, :rank].T @ curve.second_derivative(self.y, v)) / self.s[:rank])
+        position, ahead = curve.unknowns_and_inputs(self.y), curve.widen_direction(v)
+        aside = np.concatenate([np.zeros(len(v) - 1), np.broadcast_to(v[-1] ** 2 * sideways, curve.start.shape)])
+        second_order = curve.functions.kinematics(position, ahead, aside, curve.p).F2
+        base = -self.vt[:rank].T @ ((self.u[:, :rank].T @ second_order) / self.s[:rank])
         # of the null space only what is normal to the tangent
         across = np.linalg.svd(c[None])[2][1:].T
-        whole, ahead = curve.unknowns_and_inputs(self.y), curve.widen_direction(v)
 
         def third_order(e: Array) -> Array:
-            second = curve.widen_direction(base + self.null @ (across @ e))
-            return self.left_null.T @ curve.functions.third_rate_remainder(whole, ahead, second, curve.p)
+            second = curve.widen_direction(base + self.null @ (across @ e)) + aside
+            return self.left_null.T @ curve.functions.third_rate_remainder(position, ahead, second, curve.p)
 
         e = solve_third_order(third_order, across.shape[1])
         return None if e is None else CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
@@ -236,17 +243,11 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
     such point.
     """
-    start = _decompose(curve, y)
-    counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
-    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
-    near = next((candidate for candidate in refined if candidate is not None), None)
-    if near is not None and near.null.shape[1] > 2:
-        near = _refine_candidate(curve, near.y, near.null)
-    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
+    conditions = _conditions_at_start(curve, y)
+    if conditions is None:
         return None
-    ways = _BranchConditions(curve, near.y)
-    directions = branch_directions(ways.forms)
-    told = [way for way in map(ways.branch_along, directions.found) if way is not None]
+    directions = branch_directions(conditions.forms)
+    told = [way for way in map(conditions.branch_along, directions.found) if way is not None]
     moving = [way if way.input_rate > 0.0 else way.reversed() for way in told if abs(way.input_rate) > ZERO_INPUT_RATE]
     if not moving:
         return None
@@ -255,7 +256,57 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     rates = [tuple(np.round(sense * way.tangent[:-1] / way.input_rate, 6)) for way in moving]
     order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
     is_complete = directions.is_complete and len(told) == len(directions.found)
-    return Bifurcation(near.y, tuple(moving[k] for k in order), is_complete, near.null.shape[1] - 1)
+    return Bifurcation(conditions.y, tuple(moving[k] for k in order), is_complete, conditions.null.shape[1] - 1)
+
+
+def _conditions_at_start(curve: SolutionCurve, y: Array) -> _BranchConditions | None:
+    """The conditions at the change point on which a position lies to rounding; None where it is none."""
+    start = _decompose(curve, y)
+    counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
+    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
+    near = next((candidate for candidate in refined if candidate is not None), None)
+    if near is not None and near.null.shape[1] > 2:
+        near = _refine_candidate(curve, near.y, near.null)
+    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
+        return None
+    return _BranchConditions(curve, near.y)
+
+
+class SingularRates(NamedTuple):
+    """A position at a singularity, to round-off, with the rates of the one motion that goes on through it."""
+
+    z: Array
+    z1: Array
+    z2: Array
+
+
+def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
+    """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
+    u1, u2 = setup.inputs.u1, setup.inputs.u2
+    if not u1.size:
+        return None  # no input says which way
+    speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
+    # inputs that only start to move go as their accelerations say, those that stand still as the first of them
+    axis = u1 if speed > 0.0 else u2 if gain > 0.0 else np.eye(u1.size)[0]
+    axis = axis / np.linalg.norm(axis)
+    conditions = _conditions_at_start(SolutionCurve(setup, setup.inputs.u, axis), np.append(z, 0.0))
+    if conditions is None or conditions.null.shape[1] != 2:
+        return None
+    directions = branch_directions(conditions.forms).found
+    directions = [c for c in directions if abs(float(conditions.null[-1] @ c)) > ZERO_INPUT_RATE]
+    # in units of time in which the inputs run at speed one
+    acceleration = u2 / speed**2 if speed > 0.0 else 0.0 * u2
+    along = float(acceleration @ axis)
+    branch = conditions.branch_along(directions[0], acceleration - along * axis) if len(directions) == 1 else None
+    if branch is None:
+        return None
+    (*_, t), (*_, t1), (*_, t2) = branch.y, branch.tangent, branch.curvature
+    first = branch.tangent[:-1] / t1
+    second = (branch.curvature[:-1] - first * t2) / t1**2
+    z = branch.y[:-1] - t * first
+    if speed > 0.0:
+        return SingularRates(z, first * speed, (second + first * along) * speed**2)
+    return SingularRates(z, 0.0 * first, first * gain)
 
 
 def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> bool:
