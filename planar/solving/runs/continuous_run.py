@@ -147,27 +147,27 @@ class ContinuousRun:
         self, signal: Callable[[Motion], Array], ends: tuple[Array, Array], values: tuple[Array, Array], target: Array
     ) -> Array:
         """Where a signal reaches its targets between two places at which its distances from them are known and differ
-        in sign, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
-        a, b, fa, fb = (part.copy() for part in (*ends, *values))
-        room = 1e-15 * max(abs(self.low), abs(self.high))
-        for step in range(MAX_ROOT_STEPS):
-            is_open = (np.abs(b - a) > room) & (fa != 0.0) & (fb != 0.0)
-            if not is_open.any():
+        in sign, all at once, by the method of `root_finding.find_root`."""
+        (b, a), (fb, fa) = (tuple(part.copy() for part in pair) for pair in (ends, values))
+        room, part, is_open = 1e-15 * max(abs(self.low), abs(self.high)), np.full(len(a), 0.5), fa * fb < 0.0
+        for _ in range(MAX_ROOT_STEPS):
+            k = np.flatnonzero(is_open)
+            if not k.size:
                 break
+            x = a[k] + part[k] * (b[k] - a[k])
+            f = np.asarray(signal(self.motion_at(x)), dtype=float) - target[k]
+            stays = f * fa[k] > 0.0
+            c, fc = np.where(stays, a[k], b[k]), np.where(stays, fa[k], fb[k])
+            b[k], fb[k] = np.where(stays, b[k], a[k]), np.where(stays, fb[k], fa[k])
+            a[k], fa[k] = x, f
             with np.errstate(invalid="ignore", divide="ignore"):
-                middle = b - fb * (b - a) / (fb - fa)
-            half = 0.5 * (a + b)
-            middle = np.where(np.isfinite(middle) & (step % 3 < 2), middle, half)
-            middle = np.clip(middle, np.minimum(a, b), np.maximum(a, b))
-            f = np.asarray(signal(self.motion_at(middle[is_open])), dtype=float) - target[is_open]
-            for k, value in zip(np.flatnonzero(is_open), f, strict=True):
-                if value * fb[k] < 0.0:
-                    a[k], fa[k] = b[k], fb[k]
-                else:
-                    weight = 1.0 - value / fb[k]
-                    fa[k] *= weight if weight > 0.0 else 0.5
-                b[k], fb[k] = middle[k], value
-        return np.where(fa == 0.0, a, b)
+                least = room / np.abs(b[k] - x)
+                xi, phi = (x - b[k]) / (c - b[k]), (f - fb[k]) / (fc - fb[k])
+                inner = f / (fb[k] - f) * fc / (fb[k] - fc) + (c - x) / (b[k] - x) * f / (fc - f) * fb[k] / (fc - fb[k])
+            is_smooth = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
+            part[k] = np.minimum(np.maximum(np.where(is_smooth, inner, 0.5), least), 1.0 - least)
+            is_open[k] = (f != 0.0) & (least <= 0.5)
+        return np.where(np.abs(fa) < np.abs(fb), a, b)
 
     @property
     def _running(self) -> int:
