@@ -156,7 +156,7 @@ def motion_at_inputs(solver: PositionSolver, assembly: Assembly, z: Array, u: Ar
     """
     s = solver.inputs
     rates = (np.broadcast_to(rate, u.shape).copy() for rate in (s.u1, s.u2, np.zeros_like(s.u)))
-    return build_motion(solver, solver.remarks(assembly), unjudged_rows(solver, z, InputRates(u, *rates)), False, None)
+    return build_motion(solver, solver.remarks(assembly), unjudged_rows(solver, z, InputRates(u, *rates)))
 
 
 def motion_over_input(mechanism: Mechanism, positions: Array) -> Motion:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,10 +47,15 @@ class ContinuousRun:
         unknowns = None if course is None else course.unknowns
         self.z = run_unknowns(self.solver, motion) if unknowns is None else unknowns[: len(motion)]
         singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
-        self._is_sound: BoolArray = rows_with_rates(motion)
+        has_rates = rows_with_rates(motion)
+        self.is_regular = bool(has_rates.all()) and self.high > self.low
+        "whether every row has rates, so that no dead point or unsolved row is on the way"
+        self._is_sound: BoolArray = has_rates.copy()
         self._is_sound[singular] = False
         forks = () if course is None or motion.time is not None else course.fork_positions
         self.forks = self._places_of_positions(forks)
+        self._seams: Array = np.sort(np.concatenate([self.forks, self.rows[~has_rates]]))
+        "where the path does not go on smoothly"
 
     @property
     def low(self) -> float:
@@ -62,11 +66,6 @@ class ContinuousRun:
     def high(self) -> float:
         """The last place."""
         return float(self.rows[-1])
-
-    @property
-    def is_regular(self) -> bool:
-        """Whether every row has rates, so that no dead point or unsolved row is on the way."""
-        return bool(rows_with_rates(self.motion).all()) and self.high > self.low
 
     def positions(self, places: Array) -> Array:
         """The position of the running input at places (n,), rad or m."""
@@ -82,11 +81,13 @@ class ContinuousRun:
         run = run._replace(inputs=self._input_rates(places), passed=(), nearby=())
         time = None if self.motion.time is None else places
         forks = () if self.motion.course is None else self.motion.course.fork_positions
-        path = _PathAtPlaces(frozenset(run.branch_rates), forks, run.z, self.motion)
-        motion = build_motion(self.solver, self.known.remarks, run, False, path, time)
+        motion = build_motion(self.solver, self.known.remarks, run, False, time, self._limits, forks)
         if len(motion) < len(places):  # a pair that may stay open does so by too much
             raise NoAnswer(motion.outcome, motion.reason)
         return motion
+
+    def _limits(self, motion: Motion) -> tuple[Limit, ...]:
+        return () if self.motion.course is None else self.motion.course.limits(self.motion)
 
     def breaks(self) -> Array:
         """Places inside the run at which the file says that something may bend or jump, and forks of the path."""
@@ -200,16 +201,14 @@ class ContinuousRun:
 
     def _divided(self, targets: Array) -> list[Array]:
         """Sorted places, divided where the path does not go on smoothly, and where no others are near."""
-        seams = np.sort([*self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()])
         spacing = (self.high - self.low) / (len(self.rows) - 1)
         gaps = np.flatnonzero(np.diff(targets) > LONGEST_GAP * spacing) + 1
-        return np.split(targets, np.unique([*np.searchsorted(targets, seams), *gaps]).astype(int))
+        return np.split(targets, np.unique([*np.searchsorted(targets, self._seams), *gaps]).astype(int))
 
     def _follow(self, targets: Array) -> RunSamples:
         """The unknowns at sorted places, followed over the rows between them from the nearest sound row."""
-        seams = [self.low - 1.0, *self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()]
-        start = max(seam for seam in seams if seam <= targets[0])
-        stop = min((seam for seam in seams if seam >= targets[-1]), default=np.inf)
+        start = np.max(self._seams, initial=-np.inf, where=self._seams <= targets[0])
+        stop = np.min(self._seams, initial=np.inf, where=self._seams >= targets[-1])
         usable = self._is_sound & (self.rows >= start) & (self.rows <= stop)
         usable = usable if usable.any() else self._is_sound
         base = int(np.argmin(np.where(usable, np.abs(self.rows - targets[0]), np.inf)))
@@ -220,20 +219,6 @@ class ContinuousRun:
         if run.stopped is not None:
             raise run.stopped
         return run.select(1 + np.searchsorted(places, targets))
-
-
-@dataclass(eq=False)
-class _PathAtPlaces:
-    """The path of a motion at chosen places of another one; see `FollowedPath`."""
-
-    singular_rows: frozenset[int]
-    fork_positions: tuple[float, ...]
-    unknowns: Array
-    source: Motion
-
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
-        """See `Motion.limits`."""
-        return () if self.source.course is None else self.source.course.limits(self.source)
 
 
 def timed_inputs(solver: PositionSolver, time: Array) -> InputRates:

@@ -130,7 +130,7 @@ class RangeRun:
         run = self._range(steps, start, stop)
         if back:
             run = join_runs([run, run.reversed().from_row(1)._replace(passed=(), nearby=())])
-        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, RangeCourse(self, run))
+        return self._motion(run)
 
     def _range(self, steps: int, start: float | None, stop: float | None) -> RunSamples:
         if start is None and stop is None:
@@ -173,8 +173,46 @@ class RangeRun:
             passed=tracker.passed_until(),
             nearby=tuple(tracker.nearby),
         )
-        course = RangeCourse(self, run, (circuit.pieces, tracker))
-        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, course)
+        return self._motion(run, (circuit.pieces, tracker))
+
+    def _motion(self, run: RunSamples, circuit: tuple[tuple[PathPiece, ...], CurveTracker] | None = None) -> Motion:
+        """The motion of a run, or of a circuit of pieces that were walked along."""
+        forks = tuple(float(passed.u[self.index]) * self.scale for passed in run.passed if passed.is_switched)
+        positions = run.inputs.u[:, self.index]
+
+        def find_limits(_: Motion) -> tuple[Limit, ...]:
+            if len(positions) < 2:
+                return ()
+            if circuit is None:
+                return self._range_limits(positions)
+            pieces, tracker = circuit
+            search = LimitSearch(self.pair, float(positions[0]), 1.0, tracker)
+            return distinct_limits(self.pair, tracker.curve, search.along(pieces))
+
+        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, None, find_limits, forks)
+
+    def _range_limits(self, positions: Array) -> tuple[Limit, ...]:
+        """The limits between the first row and the last, from where the rows were followed from, so that the same ways
+        are taken at change points."""
+        is_there_and_back = len(positions) > 2 and positions[0] == positions[-1] and positions[1] == positions[-2]
+        last = float(positions[(len(positions) - 1) // 2 if is_there_and_back else -1])
+        first, sense = float(positions[0]), 1.0 if last >= positions[0] else -1.0
+        down, up = self._limits_until(first, -sense), self._limits_until(last, sense)
+        low, high = sorted((first * self.scale, last * self.scale))
+        room = STEP_ROUNDING * self.scale
+        between = [located for located in (*down[::-1], *up) if low - room <= located.limit.input <= high + room]
+        return distinct_limits(self.pair, self.curve_tracker(self.z, self.position).curve, between)
+
+    def _limits_until(self, last: float, sense: float) -> list[LocatedLimit]:
+        """The limits from the file's position to another one, if it lies that way; at the file's position its stops."""
+        reach = sense * (last - self.position)
+        if reach < -STEP_ROUNDING or (reach <= 0.0 and self.solver.stops is None):
+            return []
+        reach = max(reach, 0.0)
+        tracker = self.curve_tracker(self.z, self.position, sense, self.arc_budget(reach, self.position))
+        # all with the input on its way up, whichever way it was followed
+        search = LimitSearch(self.pair, self.position, sense, tracker)
+        return [located.in_direction(sense) for located in search.until(reach)]
 
     def _run(self, grid: Array) -> RunSamples:
         first, last = float(grid[0]), float(grid[-1])
@@ -358,55 +396,3 @@ def _spliced(back: RunSamples, ahead: RunSamples) -> RunSamples:
     backwards: IntArray = np.arange(len(back.z) - 1, 0, -1)
     first = back.select(backwards)._replace(passed=back.passed[::-1])
     return join_runs([first, ahead.from_row(1)])
-
-
-class RangeCourse:
-    """The curve along which an input runs: what it meets between the first row and the last."""
-
-    def __init__(
-        self, ranged: RangeRun, run: RunSamples, circuit: tuple[tuple[PathPiece, ...], CurveTracker] | None = None
-    ):
-        self.ranged, self.run, self.circuit = ranged, run, circuit
-        self.singular_rows = frozenset(run.branch_rates)
-        self.fork_positions = tuple(
-            float(passed.u[ranged.index]) * ranged.scale for passed in run.passed if passed.is_switched
-        )
-
-    @property
-    def unknowns(self) -> Array:
-        """See `FollowedPath.unknowns`."""
-        return self.run.z
-
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
-        """See `Motion.limits`."""
-        ranged = self.ranged
-        u = self.run.inputs.u[:, ranged.index]
-        if len(u) < 2:
-            return ()
-        first = float(u[0])
-        if self.circuit is not None:
-            pieces, tracker = self.circuit
-            located = list(LimitSearch(ranged.pair, first, 1.0, tracker).along(pieces))
-            return distinct_limits(ranged.pair, tracker.curve, located)
-        # from where the rows were followed from, so that the same ways are taken at change points
-        is_there_and_back = len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
-        last = float(u[(len(u) - 1) // 2 if is_there_and_back else -1])
-        sense = 1.0 if last >= first else -1.0
-        down, up = self._limits_until(first, -sense), self._limits_until(last, sense)
-        low, high = sorted((first * ranged.scale, last * ranged.scale))
-        room = STEP_ROUNDING * ranged.scale
-        between = [located for located in (*down[::-1], *up) if low - room <= located.limit.input <= high + room]
-        curve = ranged.curve_tracker(ranged.z, ranged.position).curve
-        return distinct_limits(ranged.pair, curve, between)
-
-    def _limits_until(self, last: float, sense: float) -> list[LocatedLimit]:
-        """The limits from the file's position to another one, if it lies that way; at the file's position its stops."""
-        ranged, first = self.ranged, self.ranged.position
-        reach = sense * (last - first)
-        if reach < -STEP_ROUNDING or (reach <= 0.0 and ranged.solver.stops is None):
-            return []
-        reach = max(reach, 0.0)
-        tracker = ranged.curve_tracker(ranged.z, first, sense, ranged.arc_budget(reach, first))
-        # all with the input on its way up, whichever way it was followed
-        search = LimitSearch(ranged.pair, first, sense, tracker)
-        return [located.in_direction(sense) for located in search.until(reach)]

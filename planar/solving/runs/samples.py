@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +14,8 @@ from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
-from planar.results.motion import FollowedPath, Motion
-from planar.results.records import InputMotion, ThirdRates
+from planar.results.motion import Motion
+from planar.results.records import InputMotion, Limit, ThirdRates
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR
 from planar.solving.continuation.events import change_point_remarks
 from planar.solving.continuation.run_samples import InputRates, RunSamples
@@ -24,15 +26,33 @@ from planar.solving.rates.accuracy import AccuracyDoubts
 from planar.solving.rates.sample_rates import sample_rates
 
 
+@dataclass(eq=False)
+class RunCourse:
+    """The path of a run; see `FollowedPath`."""
+
+    unknowns: Array
+    singular_rows: frozenset[int]
+    fork_positions: tuple[float, ...]
+    find_limits: Callable[[Motion], tuple[Limit, ...]]
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        return self.find_limits(motion)
+
+
 def build_motion(
     solver: PositionSolver,
     assembly_remarks: tuple[str, ...],
     run: RunSamples,
-    with_jerk: bool,
-    course: FollowedPath | None,
+    with_jerk: bool = False,
     time: Array | None = None,
+    find_limits: Callable[[Motion], tuple[Limit, ...]] | None = None,
+    fork_positions: tuple[float, ...] = (),
 ) -> Motion:
-    """The motion, with what there is to say of its assembly; raises NoAnswer where the gate does not let it pass."""
+    """The motion, with what there is to say of its assembly; raises NoAnswer where the gate does not let it pass.
+
+    Without `find_limits` its rows are positions side by side, of no path.
+    """
     if solver.equations.open_rows:
         run = _rows_within_misfit(solver, run)
         time = time if time is None else time[: len(run.z)]
@@ -49,6 +69,9 @@ def build_motion(
                 part[unsure] = rates
         else:
             parts = examined
+    course = None
+    if find_limits is not None:
+        course = RunCourse(run.z, frozenset(run.branch_rates), fork_positions, find_limits)
     names = [driven.pair for driven in solver.mechanism.inputs]
     frames, own = lazy_frames(solver, parts[:3])
     return Motion(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -48,7 +49,7 @@ def run_in_time(
         inputs = timed_inputs(solver, np.array([last]))._replace(u=u[None])
         run = run.with_last_row(z, inputs, run.outcome is Outcome.DEAD_POINT)
         time = np.append(time, last)
-    return build_motion(solver, known.remarks, run, with_jerk, TimeCourse(solver, run, time), time)
+    return build_motion(solver, known.remarks, run, with_jerk, time, _TimeLimits(solver, run, time).find)
 
 
 def _stop_time(solver: PositionSolver, run: RunSamples, time: Array) -> float | None:
@@ -72,20 +73,15 @@ def _time_at(solver: PositionSolver, u: Array, direction: Array, first: float, l
     return find_root(distance, float(first), float(last))
 
 
-class TimeCourse:
-    """A run in time between its rows."""
+@dataclass(eq=False)
+class _TimeLimits:
+    """Looks for the limits of a run in time between its rows."""
 
-    def __init__(self, solver: PositionSolver, run: RunSamples, time: Array):
-        self.solver, self.run, self.time = solver, run, time
-        self.singular_rows = frozenset(run.branch_rates)
-        self.fork_positions: tuple[float, ...] = ()
+    solver: PositionSolver
+    run: RunSamples
+    time: Array
 
-    @property
-    def unknowns(self) -> Array:
-        """See `FollowedPath.unknowns`."""
-        return self.run.z
-
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+    def find(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
         solver, run = self.solver, self.run
         passages = list(self._change_point_times())
