@@ -10,14 +10,14 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd, join_names
-from planar.solving.continuation.closed_curves import (
+from planar.solving.continuation.path_pieces import (
     MAX_PIECES,
+    PathPiece,
     follow_circuit,
     is_endless,
     moving_pieces,
     split_at_dead_points,
 )
-from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.position import PositionSolver

@@ -15,8 +15,7 @@ from planar.foundation.root_finding import find_root_by_slope, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import count_phrase, join_all_names
 from planar.results.records import Limit
-from planar.solving.continuation.closed_curves import PeriodSearch
-from planar.solving.continuation.path_pieces import PathPiece, path_pieces
+from planar.solving.continuation.path_pieces import PathPiece, PeriodSearch, path_pieces
 from planar.solving.continuation.predictor_corrector import (
     END_TOLERANCE,
     CurveTracker,

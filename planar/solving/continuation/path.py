@@ -9,9 +9,8 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, TrackingEnd
-from planar.solving.continuation.closed_curves import Period, PeriodSearch
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, fast_run
-from planar.solving.continuation.path_pieces import PathPiece, path_pieces
+from planar.solving.continuation.path_pieces import PathPiece, Period, PeriodSearch, path_pieces
 from planar.solving.continuation.predictor_corrector import (
     ArcBudget,
     CurveTracker,

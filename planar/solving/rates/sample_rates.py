@@ -1,4 +1,4 @@
-"""Velocities, accelerations and third rates of a run, from the derivatives of its constraints."""
+"""Velocities, accelerations and third rates of a run, and what round-off leaves of them."""
 
 from __future__ import annotations
 
@@ -7,19 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.linear import solve_vectors
-from planar.foundation.arrays import Array
+from planar.equations.linear import inverse_arrays, solve_vectors
+from planar.foundation.arrays import Array, BoolArray, IntArray
+from planar.foundation.errors import NoAnswer, Outcome
+from planar.model.pairs import MeasureKind
+from planar.model.wording import count_phrase
+from planar.solving.checks.residual_check import EPS, MAX_RATE_ERROR, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.run_samples import BranchRates, InputRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import regularity
 
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
 DIRECTION_TOLERANCE = 1e-9
 """A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
+SMALLEST_NORMAL = float(np.finfo(float).tiny)
+MAX_ACCELERATION_ERROR = 0.1
+"""Part of an acceleration that may be wrong."""
+SHORT_ARM = 1e-4
+"""Sizes: an arm that is shorter is named as a cause of what is lost."""
 
 
 class SampleRates(NamedTuple):
@@ -98,3 +106,193 @@ def _rates_in_time(branch_rates: BranchRates, given: InputRates, index: int) -> 
     t1, t2, t3 = along
     first, second, third = branch_rates.rates
     return np.array([first * t1, first * t2 + second * t1**2, first * t3 + 3.0 * second * t1 * t2 + third * t1**3])
+
+
+class RateErrors(NamedTuple):
+    """Estimates of what round-off makes of samples, each (samples,).
+
+    `places`: the greatest error of an angle (rad) or a length (sizes); `first`, `second`: of the velocities and the
+    accelerations, as a part of what moves in the same loop. Not numbers where none is known.
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def is_too_inexact(self) -> BoolArray:
+        """Which samples have too few digits left (samples,): next to a change point of places and velocities that are
+        known well the accelerations may be known to one."""
+        return ~(
+            (np.maximum(self.position, self.velocity) <= MAX_RATE_ERROR) & (self.acceleration <= MAX_ACCELERATION_ERROR)
+        )
+
+    @property
+    def greatest(self) -> Array:
+        """The greatest of the three (samples,)."""
+        return np.maximum.reduce(self)
+
+
+class AccuracyDoubts(NamedTuple):
+    """Samples whose accuracy is not sure: which (doubted,), by how much they are wrong at most, and a cause of each in
+    words, with what mends it."""
+
+    rows: IntArray
+    errors: RateErrors
+    causes: list[tuple[str, str]]
+
+    def remark(self, where: str = "") -> str:
+        """What there is to say of those that are accurate enough, at a place in words; nothing where there are none."""
+        kept = np.flatnonzero(~self.errors.is_too_inexact)
+        if not kept.size:
+            return ""
+        worst = int(kept[np.argmax(self.errors.greatest[kept])])
+        digits = max(int(-np.log10(self.errors.greatest[worst])), 1)
+        return f"rounding leaves {count_phrase(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}"
+
+    def refusal(self, setup: PreparedMechanism, k: int, where: str) -> NoAnswer:
+        """What to say of the k-th of them, at a place in words."""
+        cause, remedy = self.causes[k]
+        what = "no digit of the accelerations"
+        for part, of in ((self.errors.velocity, "the rates"), (self.errors.position, "the position")):
+            if not part[k] <= MAX_RATE_ERROR:
+                what = f"less than three digits of {of}"
+        return NoAnswer(Outcome.TOO_INEXACT, f"{where} rounding leaves {what}, as {cause}; {remedy}")
+
+
+def find_accuracy_doubts(
+    setup: PreparedMechanism, jacobian: Array, w: Array, y: Array, y1: Array, y2: Array
+) -> AccuracyDoubts | None:
+    """Which samples may be less accurate than they look; None where none is. Arguments as of `errors`, see there.
+
+    slope (samples, rows, unknowns), w (samples, coordinates) in sizes.
+    """
+    lost, stages, arms = _error_amplification(setup, jacobian)
+    counted = np.maximum(np.abs(w).max(axis=1, initial=0.0) / np.pi, 1.0)
+    # what is not a number is not below anything
+    rows = np.flatnonzero(~(EPS * lost * counted <= NEGLIGIBLE_ERROR))
+    if not rows.size:
+        return None
+    found = rate_errors(setup, y[rows], y1[rows], y2[rows])
+    sure = found.greatest <= NEGLIGIBLE_ERROR
+    rows, found = rows[~sure], RateErrors(*(each[~sure] for each in found))
+    if not rows.size:
+        return None
+    causes = [_cause(setup, w[row], float(counted[row]), int(stages[row]), arms[row]) for row in rows]
+    return AccuracyDoubts(rows, found, causes)
+
+
+def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, IntArray, Array]:
+    """By how much round-off is greater in the rates at most, and in which group (samples,); the arm of every unknown.
+
+    A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the group is nearly
+    singular; rates that are made of such angles lose as much once more.
+    """
+    found, which = np.ones(len(slope)), np.zeros(len(slope), dtype=int)
+    strong, arms = regularity(setup, slope), np.ones((len(slope), slope.shape[2]))
+    for index, stage in enumerate(setup.equations.blocks):
+        own = slope[:, stage.rows, stage.unknowns]
+        if own.shape[-1]:
+            arms[:, stage.unknowns] = np.linalg.norm(own, axis=1)
+            least = arms[:, stage.unknowns].min(axis=1)
+            lost = 1.0 / np.maximum(least * strong[:, index] ** 2, SMALLEST_NORMAL)
+            which = np.where(lost > found, index, which)
+            found = np.maximum(found, lost)
+    return found, which, arms
+
+
+def _cause(setup: PreparedMechanism, w: Array, counted: float, stage: int, arms: Array) -> tuple[str, str]:
+    """Why round-off grows at a sample, and a remedy."""
+    e = setup.equations
+    if EPS * counted > NEGLIGIBLE_ERROR:
+        worst = e.coordinates[int(np.argmax(np.abs(w)))]
+        size = f"{float(np.max(np.abs(w))):.3g}"
+        if worst.kind is MeasureKind.LENGTH:
+            return f"{worst.owner!r} is {size} times as far away as the mechanism is large", "bring them nearer"
+        return f"the angle of link {worst.owner!r} counts up to {size} rad", "start from fewer turns"
+    own = e.blocks[stage].unknowns
+    k = own.start + int(np.argmin(arms[own])) if own.stop > own.start else 0
+    if arms.size and arms[k] < SHORT_ARM:
+        link = e.coordinates[e.unknowns[k]].owner
+        return (
+            f"link {link!r} has an arm of {float(arms[k]):.2g} of the mechanism's size",
+            f"lengthen link {link!r}, or make one link of those that it joins",
+        )
+    links = ", ".join(repr(link) for link in e.blocks[stage].links)
+    return f"{links} stand next to a dead point or a change point", "move the input"
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # what is not a number is not known
+def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
+    """What round-off makes of y = (z, u) and its rates, each (samples, y), with no more known than doubles hold.
+
+    Every number of a row may be wrong by EPS of itself, and the row by what it leaves open. So much is the position
+    wrong by the inverse of the slope (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM
+    2002, sec. 7.2: the componentwise condition), and the rates' rows by what that changes in them.
+    """
+    e = setup.equations
+    rows, unknowns = len(e.rows), len(e.unknowns)
+    terms = setup.functions.rounding_terms(y, y1, y2, setup.inputs.p)
+    slope, first, second = (
+        np.abs(jacobian) for jacobian in (terms.jacobian, terms.first_rate_jacobian, terms.second_rate_jacobian)
+    )
+    inverse = np.abs(inverse_arrays(terms.jacobian[:, :rows, :unknowns]))
+
+    def solved(of_rows: Array, of_inputs: Array) -> Array:
+        return np.hstack([_matrix_times_vector(inverse, of_rows), of_inputs])
+
+    inputs = np.abs(y[:, unknowns:])
+    dy = solved(np.abs(terms.value[:, :rows]) + EPS * terms.term_sum[:, :rows], EPS * inputs)
+    at = _matrix_times_vector(slope[:, rows:], dy) + EPS * terms.term_sum[:, rows:]
+    lost1 = _matrix_times_vector(first, dy) + EPS * _matrix_times_vector(slope, np.abs(y1))
+    dy1 = solved(lost1[:, :rows], EPS * np.abs(y1[:, unknowns:]))
+    lost2 = (
+        _matrix_times_vector(second, dy)
+        + 2.0 * _matrix_times_vector(first, dy1)
+        + EPS * _matrix_times_vector(slope, np.abs(y2))
+    )
+    dy2 = solved(lost2[:, :rows], EPS * np.abs(y2[:, unknowns:]))
+    one, two = _reference_rates(setup, slope[:, :rows], np.abs(y1), np.abs(y2))
+    return RateErrors(_row_maxima(at), _row_maxima(_relative_errors(dy1, one)), _row_maxima(_relative_errors(dy2, two)))
+
+
+def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
+    """How fast everything in y moves, or would if it did not just come to rest (samples, y), to each order.
+
+    What comes first moves the rows of a group, and a row its unknowns, each by its arm. So a link that turns back is
+    judged by what moves it, and one that is slow because all is slow around it by that.
+    """
+    e = setup.equations
+    many = len(e.unknowns)
+    angles = np.append(e.unknown_is_angle, np.ones(y1.shape[1] - many, dtype=bool))
+    one, two = y1.copy(), np.maximum(y2, y1 * y1 * angles)
+    for stage in e.blocks:
+        own = slice(stage.unknowns.start, stage.unknowns.stop)
+        block = slope[:, stage.rows]
+        names = [row.pair for row in e.rows[stage.rows]]
+        alike = np.array([[a == b for b in names] for a in names], dtype=bool).reshape(len(names), len(names))
+        for pace in (one, two):
+            for _ in range(len(names)):
+                terms = (block * pace[:, None]).max(axis=2, initial=0.0)
+                # both rows of a pin: what moves along one axis now moves along the other in a while
+                terms = np.where(alike, terms[:, None], 0.0).max(axis=2, initial=0.0)
+                arms = np.sqrt((alike @ (block[:, :, own] ** 2)).clip(SMALLEST_NORMAL))
+                could = np.where(block[:, :, own] > 0.0, terms[:, :, None] / arms, 0.0).max(axis=1, initial=0.0)
+                grown = np.maximum(pace[:, own], could)
+                if np.all(grown <= 2.0 * pace[:, own]):
+                    break
+                pace[:, own] = grown
+        two[:, own] = np.maximum(two[:, own], one[:, own] ** 2 * angles[own])
+    return one, two
+
+
+def _matrix_times_vector(matrices: Array, vectors: Array) -> Array:
+    return (matrices @ vectors[..., None])[..., 0]
+
+
+def _relative_errors(errors: Array, references: Array) -> Array:
+    return np.where(errors > 0.0, errors / np.maximum(references, SMALLEST_NORMAL), 0.0)
+
+
+def _row_maxima(values: Array) -> Array:
+    return np.max(values, axis=1, initial=0.0)

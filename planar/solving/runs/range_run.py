@@ -15,11 +15,10 @@ from planar.model.mechanism import LARGEST_INPUT_POSITION, Drive, Mechanism, rep
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
 from planar.results.records import Limit
-from planar.solving.continuation.closed_curves import follow_circuit
 from planar.solving.continuation.events import LimitSearch, LocatedLimit, distinct_limits
 from planar.solving.continuation.fast_path import fast_run
 from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
-from planar.solving.continuation.path_pieces import PathPiece
+from planar.solving.continuation.path_pieces import PathPiece, follow_circuit
 from planar.solving.continuation.predictor_corrector import (
     MAX_ARCS,
     SHOWN_SLIDE_EXTENT,

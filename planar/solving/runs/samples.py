@@ -22,8 +22,7 @@ from planar.solving.continuation.run_samples import InputRates, RunSamples
 from planar.solving.diagnosis import refusals
 from planar.solving.lazy_frames import lazy_frames
 from planar.solving.position import PositionSolver
-from planar.solving.rates.accuracy import AccuracyDoubts
-from planar.solving.rates.sample_rates import sample_rates
+from planar.solving.rates.sample_rates import AccuracyDoubts, sample_rates
 
 
 @dataclass(eq=False)
