@@ -19,7 +19,6 @@ from planar.solving.position import SolvedMechanism, solved_mechanism
 from planar.solving.runs.range_run import Progress, RangeRun
 from planar.solving.runs.time_run import run_in_time
 
-"""A run of so many positions of forty links takes some hundred megabytes."""
 MAX_DURATION = 1e6
 """s"""
 
@@ -80,9 +79,7 @@ def cycle(
     check_number("duration", duration, MAX_DURATION, "s")
     if duration is not None and not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
-    numbers = branches if isinstance(branches, Iterable) else [branches]
-    numbered = not any(isinstance(each, bool) or not isinstance(each, Integral) or each < 1 for each in numbers)
-    if not numbered or not isinstance(branches, Iterable):
+    if not isinstance(branches, Iterable) or not all(_is_count(number) for number in branches):
         raise BadInput("branches", f"a list of numbers of branches from 1 on is wanted, not {branches!r:.60}")
     ranged = (start is not None, stop is not None, pair is not None, there_and_back, circuit)
     lawful = any(given.law is not None for given in mechanism.inputs)
@@ -106,6 +103,11 @@ def cycle(
     return _explained_run(known, pair, run)
 
 
+def _is_count(number: object) -> bool:
+    """Whether an argument is a number from 1 on, and no truth value."""
+    return isinstance(number, Integral) and not isinstance(number, bool) and int(number) >= 1
+
+
 def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
     """A run; where no input can run from the position, `motion_refusal` says why.
 
@@ -116,7 +118,7 @@ def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], M
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
     positions = [given.position for given in motion.inputs.values()]
-    if any(each[0] != each[-1] or np.ptp(each) for each in positions):
+    if any(np.ptp(position) for position in positions):
         return motion
     subject = "inputs" if len(positions) > 1 else "input"
     remark = f"nothing moves over the whole run, as the {subject} at {quote_names(list(motion.inputs))} "

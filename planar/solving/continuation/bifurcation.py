@@ -319,7 +319,7 @@ def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> boo
     gone = float(branch.tangent @ (branch.y - here.y))
     if gone * float(branch.tangent @ here.tangent) <= 0.0:
         return False
-    guess = curve.correct(branch.y - gone * branch.tangent + 0.5 * gone**2 * branch.curvature, branch.tangent)
+    guess = curve.correct(branch.ahead(-gone), branch.tangent)
     return guess is not None and float(np.linalg.norm(guess - here.y)) < ON_BRANCH_RATIO * abs(gone)
 
 
@@ -330,11 +330,8 @@ def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) ->
     """
     half = min(HALF_ARC_LENGTH, 0.1 / max(float(np.linalg.norm(branch.curvature)), 1e-300))
     while half > MIN_HALF_ARC_LENGTH:
-        ends = []
-        for x in (-half, half):
-            y = curve.correct(branch.y + x * branch.tangent + 0.5 * x**2 * branch.curvature, branch.tangent)
-            if y is not None:
-                ends.append(curve.point_at(y, branch.tangent))
+        places = [curve.correct(branch.ahead(x), branch.tangent) for x in (-half, half)]
+        ends = [curve.point_at(y, branch.tangent) for y in places if y is not None]
         if len(ends) == 2 and all(end.tangent @ branch.tangent > 0.9 for end in ends):
             before, after = ends
             shape = fit_polynomial((before, branch, after), branch.tangent, (-1.0, 0.0, 1.0), half)

@@ -315,19 +315,15 @@ def change_point_remarks(
 
 def change_point_remark(setup: PreparedMechanism, passed: PassedBifurcation) -> str:
     """What to say of a change point that a motion passes."""
-    ways, more = len(passed.bifurcation.branches), "" if passed.bifurcation.is_complete else "at least "
-    at = join_all_names(
-        [
-            setup.describe_input(g.pair, u)
-            for g, u, w in zip(setup.mechanism.inputs, passed.u, passed.input_direction, strict=True)
-            if w
-        ]
-    )
-    if ways == 1 and not more:
-        return f"at {at} there is one more motion to first order, but only this one goes on"
+    branch_count, is_complete = len(passed.bifurcation.branches), passed.bifurcation.is_complete
+    moving = zip(setup.mechanism.inputs, passed.u, passed.input_direction, strict=True)
+    place = join_all_names([setup.describe_input(driven.pair, u) for driven, u, part in moving if part])
+    if branch_count == 1 and is_complete:
+        return f"at {place} there is one more motion to first order, but only this one goes on"
     asked = "the last that there is" if passed.beyond else "as asked for"
     if passed.is_start:
-        number = f"this motion starts there by number {passed.branch_index + 1}, {asked}"
-        return f"at {at} {more}{count_phrase(max(ways, 2), 'branch', 'branches')} of the motion cross; {number}"
-    on = "this one goes on smoothly" if passed.branch_index == 0 else f"another one was taken, {asked}"
-    return f"at {at} {more}{count_phrase(max(ways, 2), 'branch', 'branches')} of the motion cross; {on}"
+        choice = f"this motion starts there by number {passed.branch_index + 1}, {asked}"
+    else:
+        choice = "this one goes on smoothly" if passed.branch_index == 0 else f"another one was taken, {asked}"
+    count = count_phrase(max(branch_count, 2), "branch", "branches")
+    return f"at {place} {'' if is_complete else 'at least '}{count} of the motion cross; {choice}"

@@ -115,7 +115,7 @@ def next_point(curve: ImplicitCurve, here: CurvePoint, longest: float) -> tuple[
     bent = max(length_of(here.curvature), 1e-300)
     step = min(longest, FIRST_DISTANCE_RATIO * here.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
     while step > SHORTEST_STEP:
-        y = curve.correct(here.y + step * here.tangent + 0.5 * step**2 * here.curvature, here.tangent)
+        y = curve.correct(here.ahead(step), here.tangent)
         if y is not None:
             after = curve.point_at(y, here.tangent)
             gone = length_of(y - here.y)

@@ -67,6 +67,10 @@ class CurvePoint(NamedTuple):
         is_near = g * g <= DEAD_POINT_TOLERANCE**2 * abs(b)
         return is_near or abs(g) * max(1.0, greatest_size(self.y)) < RESTING_INPUT_RATE
 
+    def ahead(self, distance: float) -> Array:
+        """Where the curve is so far ahead (n + 1,), to second order."""
+        return self.y + distance * self.tangent + 0.5 * distance**2 * self.curvature
+
     def towards(self, direction: Array) -> CurvePoint:
         """The same point, to be left less than a right angle from a direction (n + 1,)."""
         return self if self.tangent @ direction >= 0.0 else self.reversed()
@@ -93,10 +97,6 @@ class ImplicitCurve:
     def jacobian(self, y: Array) -> Array | SparseMatrices:
         """J (rows, n + 1)."""
         return self.residuals_and_jacobian(y)[1]
-
-    def residuals(self, y: Array) -> Array:
-        """F (rows,)."""
-        return self.residuals_and_jacobian(y)[0]
 
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -106,30 +105,26 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
     return run.select(np.arange(beyond[0]))._replace(stopped=refusal, reason="")
 
 
-class _CheckedRates(NamedTuple):
-    """Rows on the general path: w with its rates (rows, coordinates) of each order, what the worst constraint leaves
-    open, and what there is to say."""
-
-    coordinate_rates: list[Array]
-    residual: float
-    remarks: tuple[str, ...] = ()
+CheckedRates = tuple[list[Array], float, tuple[str, ...]]
+"""Rows on the general path: w with its rates (rows, coordinates) of each order, what the worst constraint leaves open,
+and what there is to say."""
 
 
-def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> _CheckedRates | None:
+def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> CheckedRates | None:
     """Rows that are all dead points, which have no rates, by the acceptance test; None where it does not tell."""
     if solver.acceptance is None or len(run.dead_points) < len(run.z):
         return None
     w: Array = np.full((3, len(run.z), len(solver.scale)), np.nan)
     residual = 0.0
-    for row, (z, *given) in enumerate(zip(run.z, *run.inputs[:3], strict=True)):
-        coordinate_rates, judged = solver.acceptance.position(z, InputSamples(*given), solver.acceptance_scales)
+    for row, (z, *inputs) in enumerate(zip(run.z, *run.inputs[:3], strict=True)):
+        coordinate_rates, judged = solver.acceptance.position(z, InputSamples(*inputs), solver.acceptance_scales)
         w[0, row], residual = coordinate_rates[0], max(residual, judged.residual)
         if not (judged.residual <= solver.tolerance and judged.contact_gap <= CONTACT_TOLERANCE):
             return None
-    return _CheckedRates([*w], residual)
+    return [*w], residual, ()
 
 
-def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool) -> _CheckedRates:
+def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool) -> CheckedRates:
     """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer. The rows
     may be a part of a run whose other rows have rates."""
     z, given = run.z, run.inputs
@@ -165,7 +160,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
         remarks = (*remarks, f"{at} no rates are given: they would break pair {pair!r}, next to a change point")
         determined &= ~wrong
     solver.refuse_open_contact(frames, own)
-    return _CheckedRates(parts, residual, remarks)
+    return parts, residual, remarks
 
 
 def _undetermined_remark(solver: PositionSolver, run: RunSamples, w1: Array) -> tuple[str, ...]:
