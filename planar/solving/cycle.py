@@ -82,7 +82,7 @@ def cycle(
     if not isinstance(branches, Iterable) or not all(_is_count(number) for number in branches):
         raise BadInput("branches", f"a list of numbers of branches from 1 on is wanted, not {branches!r:.60}")
     ranged = (start is not None, stop is not None, pair is not None, there_and_back, circuit)
-    lawful = any(given.law is not None for given in mechanism.inputs)
+    lawful = any(driven.law is not None for driven in mechanism.inputs)
     is_timed = duration is not None or (lawful and not any(ranged))
     known, count = solved_mechanism(mechanism), len(mechanism.inputs)
     if not count or known.is_rigid or (count > 1 and pair is None and not is_timed):
@@ -117,7 +117,7 @@ def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], M
         motion = run()
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
-    positions = [given.position for given in motion.inputs.values()]
+    positions = [driven.position for driven in motion.inputs.values()]
     if any(np.ptp(position) for position in positions):
         return motion
     subject = "inputs" if len(positions) > 1 else "input"

@@ -84,7 +84,7 @@ class Bifurcation(NamedTuple):
     rank_loss: int
 
 
-def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: float) -> Iterator[BifurcationCandidate]:
+def bifurcation_candidates(curve: SolutionCurve, point: CurvePoint, farthest: float) -> Iterator[BifurcationCandidate]:
     """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds by steps
     no longer than `farthest`.
 
@@ -92,23 +92,23 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint, farthest: flo
     once, each is found.
     Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
-    y = here.y + min(here.regular_distance, 0.1) * here.tangent
+    y = point.y + min(point.regular_distance, 0.1) * point.tangent
     start = _decompose(curve, y)
     small = start.values < min(SMALL_SINGULAR_VALUE * start.greatest, ALIKE_RATIO * start.values[-1])
     if MOST_SMALL_VALUES <= small.sum() <= MOST_ALIKE_VALUES:
-        found = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
-        if found is not None:
-            yield found
+        candidate = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
+        if candidate is not None:
+            yield candidate
     for second in range(2, min(len(start.right), LEAST_VALUES + 1) + 1):
         if second > 2 and start.values[1 - second] > SMALL_SINGULAR_VALUE * start.greatest:
             return
-        found = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
-        if found is None and 2 < second <= MOST_SMALL_VALUES:
-            found = _refine_candidate(curve, y, start.right[-second:].T, start, farthest)
-        if found is not None and found.null.shape[1] > 2:
-            found = _refine_candidate(curve, found.y, found.null)
-        if found is not None:
-            yield found
+        candidate = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
+        if candidate is None and 2 < second <= MOST_SMALL_VALUES:
+            candidate = _refine_candidate(curve, y, start.right[-second:].T, start, farthest)
+        if candidate is not None and candidate.null.shape[1] > 2:
+            candidate = _refine_candidate(curve, candidate.y, candidate.null)
+        if candidate is not None:
+            yield candidate
 
 
 class _Decomposition(NamedTuple):
@@ -134,8 +134,8 @@ def _decompose(curve: SolutionCurve, y: Array, least: int = LEAST_VALUES) -> _De
     residual, jacobian = curve.residuals_and_jacobian(y)
     if isinstance(jacobian, SparseMatrices):
         try:
-            found = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(least)
-            return _Decomposition(residual, jacobian, *found, max(jacobian.greatest_singular_value_bound(), 1.0))
+            vectors = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(least)
+            return _Decomposition(residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
         except ValueError:
             jacobian = np.asarray(jacobian)
     left, values, right = np.linalg.svd(jacobian)
@@ -153,19 +153,19 @@ def _refine_candidate(
     these (n + 1, k); None where Newton's method does not settle by steps no longer than the longest.
     """
 
-    many = null_start.shape[1] + MORE_VALUES
+    count = null_start.shape[1] + MORE_VALUES
 
-    def here(tried: Array) -> tuple[Array, Array]:
-        constraints = start if start is not None and tried is y else _decompose(curve, tried, many)
+    def step_at(tried: Array) -> tuple[Array, Array]:
+        constraints = start if start is not None and tried is y else _decompose(curve, tried, count)
         return _step_to_lower_rank(curve, tried, constraints, null_start), np.zeros((0, 0))
 
     settled_at = (len(y), CONVERGED_STEP)
-    found, is_settled = settle(here, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
+    settled, is_settled = settle(step_at, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
     if not is_settled:
         return None
-    there = _decompose(curve, found)
-    gap = float(np.max(np.abs(there.residual), initial=0.0))
-    return BifurcationCandidate(found, there.null, gap) if there.null.shape[1] > 1 else None
+    decomposition = _decompose(curve, settled)
+    gap = float(np.max(np.abs(decomposition.residual), initial=0.0))
+    return BifurcationCandidate(settled, decomposition.null, gap) if decomposition.null.shape[1] > 1 else None
 
 
 def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposition, null_start: Array) -> Array:
@@ -229,17 +229,17 @@ class _BranchConditions:
         return None if e is None else CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
 
 
-def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifurcation | None:
+def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifurcation | None:
     """A change point with the ways through it, if one of them leads from a point beside it."""
-    ways = _BranchConditions(curve, y)
-    first = nearest_direction(ways.forms, ways.null.T @ (y - here.y))
-    came = None if first is None else ways.branch_along(first)
-    if first is None or came is None or not _leads_to(curve, here, came):
+    conditions = _BranchConditions(curve, y)
+    first = nearest_direction(conditions.forms, conditions.null.T @ (y - point.y))
+    coming = None if first is None else conditions.branch_along(first)
+    if first is None or coming is None or not _leads_to(curve, point, coming):
         return None
-    directions = branch_directions(ways.forms)
-    others = [ways.branch_along(c) for c in directions.found if not is_same_direction(c, first)]
-    told = tuple(way for way in others if way is not None)
-    return Bifurcation(y, (came, *told), directions.is_complete and len(told) == len(others), len(first) - 1)
+    directions = branch_directions(conditions.forms)
+    others = [conditions.branch_along(c) for c in directions.found if not is_same_direction(c, first)]
+    branches = tuple(branch for branch in others if branch is not None)
+    return Bifurcation(y, (coming, *branches), directions.is_complete and len(branches) == len(others), len(first) - 1)
 
 
 def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
@@ -252,16 +252,20 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     if conditions is None:
         return None
     directions = branch_directions(conditions.forms)
-    told = [way for way in map(conditions.branch_along, directions.found) if way is not None]
-    moving = [way if way.input_rate > 0.0 else way.reversed() for way in told if abs(way.input_rate) > ZERO_INPUT_RATE]
-    if not moving:
+    branches = [branch for branch in map(conditions.branch_along, directions.found) if branch is not None]
+    outgoing = [
+        branch if branch.input_rate > 0.0 else branch.reversed()
+        for branch in branches
+        if abs(branch.input_rate) > ZERO_INPUT_RATE
+    ]
+    if not outgoing:
         return None
     # as the inputs' own way goes, so that both ways from here count alike
     sense = np.sign(curve.input_direction[np.argmax(np.abs(curve.input_direction))])
-    rates = [tuple(np.round(sense * way.tangent[:-1] / way.input_rate, 6)) for way in moving]
-    order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
-    is_complete = directions.is_complete and len(told) == len(directions.found)
-    return Bifurcation(conditions.y, tuple(moving[k] for k in order), is_complete, conditions.null.shape[1] - 1)
+    rates = [tuple(np.round(sense * branch.tangent[:-1] / branch.input_rate, 6)) for branch in outgoing]
+    order = sorted(range(len(outgoing)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
+    is_complete = directions.is_complete and len(branches) == len(directions.found)
+    return Bifurcation(conditions.y, tuple(outgoing[k] for k in order), is_complete, conditions.null.shape[1] - 1)
 
 
 def _conditions_at_start(curve: SolutionCurve, y: Array) -> _BranchConditions | None:
@@ -314,13 +318,13 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     return SingularRates(z, 0.0 * first, first * gain)
 
 
-def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> bool:
+def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bool:
     """Whether a way through a change point leads to a point beside it."""
-    gone = float(branch.tangent @ (branch.y - here.y))
-    if gone * float(branch.tangent @ here.tangent) <= 0.0:
+    distance = float(branch.tangent @ (branch.y - point.y))
+    if distance * float(branch.tangent @ point.tangent) <= 0.0:
         return False
-    guess = curve.correct(branch.ahead(-gone), branch.tangent)
-    return guess is not None and float(np.linalg.norm(guess - here.y)) < ON_BRANCH_RATIO * abs(gone)
+    guess = curve.correct(branch.ahead(-distance), branch.tangent)
+    return guess is not None and float(np.linalg.norm(guess - point.y)) < ON_BRANCH_RATIO * abs(distance)
 
 
 def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) -> Arc | None:
@@ -394,10 +398,10 @@ def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> 
     mixed = forms / scale
     if len(forms) > size - 1:
         mixed = np.tensordot(rng.normal(size=(size - 1, len(forms))), mixed, 1)
-    every = _complex_directions(mixed, STARTS_PER_DIRECTION * 2 ** (size - 1), rng)
-    real = [c.real for c in every if np.abs(c.imag).max() < SAME_DIRECTION_TOLERANCE]
-    found = [way for c in real if (way := nearest_direction(forms, c, tolerance)) is not None]
-    return BranchDirections(found, len(every) == 2 ** (size - 1))
+    complex_directions = _complex_directions(mixed, STARTS_PER_DIRECTION * 2 ** (size - 1), rng)
+    real = [c.real for c in complex_directions if np.abs(c.imag).max() < SAME_DIRECTION_TOLERANCE]
+    directions = [direction for c in real if (direction := nearest_direction(forms, c, tolerance)) is not None]
+    return BranchDirections(directions, len(complex_directions) == 2 ** (size - 1))
 
 
 def _complex_directions(forms: Array, start_count: int, rng: np.random.Generator) -> list[ComplexArray]:
@@ -415,13 +419,13 @@ def _complex_directions(forms: Array, start_count: int, rng: np.random.Generator
         c, slopes, open_ = c[is_regular], slopes[is_regular], open_[is_regular]
         step = np.linalg.solve(slopes, open_[..., None])[..., 0]
         c, change = c - step, np.linalg.norm(step, axis=1)
-    found: list[ComplexArray] = []
-    for way in c[change < SETTLED_DIRECTION]:
-        greatest = way[np.argmax(np.abs(way))]
-        own = way * (abs(greatest) / greatest / np.linalg.norm(way))
-        if all(1.0 - abs(np.vdot(own, other)) > SAME_DIRECTION_TOLERANCE for other in found):
-            found.append(own)
-    return found
+    directions: list[ComplexArray] = []
+    for direction in c[change < SETTLED_DIRECTION]:
+        greatest = direction[np.argmax(np.abs(direction))]
+        unit = direction * (abs(greatest) / greatest / np.linalg.norm(direction))
+        if all(1.0 - abs(np.vdot(unit, other)) > SAME_DIRECTION_TOLERANCE for other in directions):
+            directions.append(unit)
+    return directions
 
 
 def is_same_direction(c: Array, other: Array) -> bool:

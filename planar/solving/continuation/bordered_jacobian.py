@@ -66,12 +66,12 @@ class BorderedJacobian:
         By iteration of a subspace that is somewhat larger: Golub and Van Loan, sec. 8.2.4.
         """
         rows, even = len(self.border) - 1, np.ones(len(self.border))
-        many = min(count + MORE_VECTORS, rows)
-        left = np.linalg.qr(np.random.default_rng(rows).normal(size=(rows, many)))[0]
+        vector_count = min(count + MORE_VECTORS, rows)
+        left = np.linalg.qr(np.random.default_rng(rows).normal(size=(rows, vector_count)))[0]
         for _ in range(SUBSPACE_STEPS):
             left = np.linalg.qr(self.transposed_pseudo_inverse(self.pseudo_inverse(left, even), even))[0]
         turned, inverses, right = np.linalg.svd(self.pseudo_inverse(left, even).T, full_matrices=False)
-        order = slice(min(count, many) - 1, None, -1) if count < many else slice(None, None, -1)
+        order = slice(min(count, vector_count) - 1, None, -1) if count < vector_count else slice(None, None, -1)
         values = 1.0 / np.maximum(inverses, 1e-300)
         return (left @ turned)[:, order], values[order], np.vstack([right[order], self.tangent])
 
@@ -98,10 +98,10 @@ class BorderedJacobian:
 def closing_step(jacobian: SparseMatrices, residual: Array, left: Array, null: Array) -> Array:
     """x (n + 1,), normal to null vectors (n + 1, k + 1), that closes F in all directions but those left ones (n, k)."""
     factors = factorised(jacobian.bordered_by_blocks(left, null.T))
-    many = null.shape[0]
+    n = null.shape[0]
     if factors is None:
-        return np.full(many, np.nan)
-    step: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:many]
+        return np.full(n, np.nan)
+    step: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:n]
     return step
 
 

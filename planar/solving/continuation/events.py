@@ -41,7 +41,7 @@ MAX_REMARKS = 12
 def watched_outputs(setup: PreparedMechanism) -> tuple[Pair, ...]:
     """The relative motions whose ends of stroke are reported: all slides, and all pairs in which a link turns on the
     frame, but for inputs."""
-    inputs = {given.pair for given in setup.mechanism.inputs}
+    inputs = {driven.pair for driven in setup.mechanism.inputs}
     frame = setup.mechanism.frame
     return tuple(
         pair
@@ -111,11 +111,11 @@ class LimitSearch:
                 there = point._replace(y=point.y + times * period.growth)
                 if there.y[-1] > last + END_TOLERANCE:
                     continue
-                told = limit.told
+                remark = limit.told
                 if passed is not None:
-                    told = change_point_remark(self.setup, passed._replace(u=self.curve.inputs(there.y)))
+                    remark = change_point_remark(self.setup, passed._replace(u=self.curve.inputs(there.y)))
                 value = limit.value + times * growth
-                yield LocatedLimit(limit._replace(input=self._position(there), value=value, told=told), there, passed)
+                yield LocatedLimit(limit._replace(input=self._position(there), value=value, told=remark), there, passed)
 
     def _growth(self, located: LocatedLimit, growth: Array) -> float:
         """By how much the value of a limit grows with each period: an output may turn with the input."""
@@ -135,11 +135,12 @@ class LimitSearch:
         of: str,
         point: CurvePoint,
         value: float | None = None,
-        told: str = "",
+        remark: str = "",
         passed: PassedBifurcation | None = None,
     ) -> LocatedLimit:
         position = self._position(point)
-        return LocatedLimit(Limit(kind, of, position, position if value is None else value, None, told), point, passed)
+        value = position if value is None else value
+        return LocatedLimit(Limit(kind, of, position, value, None, remark), point, passed)
 
     def along(
         self, pieces: Iterable[PathPiece], last: float = np.inf, begin: CurvePoint | None = None
@@ -163,8 +164,8 @@ class LimitSearch:
             for passed in self.tracker.passed_until(last)[passed_count:]:
                 if not (passed.is_start or np.array_equal(passed.bifurcation.y, arc.after.y)):
                     break  # farther on: a walk that has gone its whole way knows them all
-                told = change_point_remark(self.setup, passed)
-                yield self._located("change point", self.pair, passed.bifurcation.branches[0], None, told, passed)
+                remark = change_point_remark(self.setup, passed)
+                yield self._located("change point", self.pair, passed.bifurcation.branches[0], None, remark, passed)
                 passed_count += 1
             if piece.dead_point is not None and piece.first != piece.last:
                 yield self._located("input dead point", self.pair, piece.dead_point)
@@ -178,10 +179,10 @@ class LimitSearch:
             for stop in self.setup.stops_at(point.y[:-1], self.curve.inputs(point.y)):
                 yield self._located("stop", stop.pair, point, stop.position)
         elif ending in (TrackingEnd.WORK_LIMIT, TrackingEnd.INTERRUPTED):
-            told = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
+            remark = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
             if ending is TrackingEnd.INTERRUPTED:
-                told = "what lies beyond was not followed, as the computation was ended"
-            yield self._located("not followed further", self.pair, point, None, told)
+                remark = "what lies beyond was not followed, as the computation was ended"
+            yield self._located("not followed further", self.pair, point, None, remark)
 
     def _piece_end(self, point: CurvePoint) -> _PieceEnd:
         return _PieceEnd(point, pair_motions_at(self.outputs, self.curve, point))
@@ -234,10 +235,10 @@ class _PieceEnd(NamedTuple):
     output_rates: Array
 
 
-def distinct_limits(pair: str, curve: SolutionCurve, found: Iterable[LocatedLimit]) -> tuple[Limit, ...]:
+def distinct_limits(pair: str, curve: SolutionCurve, limits: Iterable[LocatedLimit]) -> tuple[Limit, ...]:
     """Limits in their order, each once, with the two ends of every slide on the frame told apart."""
     once: list[LocatedLimit] = []
-    for located in found:
+    for located in limits:
         if not any(_is_same_limit(other, located) for other in once[-8:]):
             once.append(located)
     return tuple(_name_stroke_ends(curve, pair, once))
@@ -254,14 +255,14 @@ def _is_same_limit(one: LocatedLimit, other: LocatedLimit) -> bool:
     )
 
 
-def _name_stroke_ends(curve: SolutionCurve, pair: str, found: list[LocatedLimit]) -> Iterator[Limit]:
+def _name_stroke_ends(curve: SolutionCurve, pair: str, limits: list[LocatedLimit]) -> Iterator[Limit]:
     """The limits, with the two ends of every slide told apart by how far they are from the driving crank's pin."""
     setup, driving = curve.solver, curve.solver.relative_motions[pair]
     frame, rounding = setup.mechanism.frame, SAME_VALUE_TOLERANCE * setup.unit
     pins = [pin for pin in driving.coincident_points() if pin[0] == frame and driving.input_kind is MeasureKind.ANGLE]
     ends: dict[str, tuple[float, float]] = {}
     for output in watched_outputs(setup):
-        strokes = [located for located in found if located.limit[:2] == ("stroke end", output.name)]
+        strokes = [located for located in limits if located.limit[:2] == ("stroke end", output.name)]
         if output.input_kind is not MeasureKind.LENGTH or frame not in output.links or len(strokes) < 2:
             continue
         low, high = (end(strokes, key=lambda located: located.limit.value) for end in (min, max))
@@ -273,7 +274,7 @@ def _name_stroke_ends(curve: SolutionCurve, pair: str, found: list[LocatedLimit]
             if far < near - rounding:
                 bottom, top = high, low
         ends[output.name] = bottom.limit.value, top.limit.value
-    for limit, _, _ in found:
+    for limit, _, _ in limits:
         if limit.kind == "stroke end" and limit.of in ends:
             at_bottom, at_top = (abs(limit.value - value) <= rounding for value in ends[limit.of])
             yield limit._replace(end="TDC" if at_top else "BDC" if at_bottom else None)

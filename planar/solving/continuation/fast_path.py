@@ -119,12 +119,12 @@ def _run_along(
 
     `ratio` says how many steps the ends of one together have to be from where a block is singular.
     """
-    functions, (axis, gone) = setup.acceptance, path
+    functions, (axis, steps) = setup.acceptance, path
     assert functions is not None
     inputs = InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u))
     z, judged = functions.run(z, inputs, setup.acceptance_scales, start)
-    ends = _ends(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances, gone[:, None])
-    accepted, squares = _is_closed(judged.result, setup.tolerance), gone * gone * (axis @ axis)
+    ends = _ends(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances, steps[:, None])
+    accepted, squares = _is_closed(judged.result, setup.tolerance), steps * steps * (axis @ axis)
     accepted[1:] &= keep_branch(np.diff(z, axis=0), *ends, squares, functions.block_starts, ratio)
     return z, judged, accepted
 
@@ -230,11 +230,11 @@ class StraightPathCache:
 
     def unknowns_at(self, stop: Sequence[float]) -> Array | None:
         """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        way = self._way_to(stop)
-        if way.reach == 0.0:
+        path = self._way_to(stop)
+        if path.reach == 0.0:
             return None if self.setup.acceptance is None or self.setup.stops is not None else self.z
-        kept = self._last_kept(way)
-        last = kept and self._walk(kept.z, np.array([way.last_stride * STEP_LENGTH, way.reach]), way.axis)[1]
+        cached = self._last_kept(path)
+        last = cached and self._walk(cached.z, np.array([path.last_stride * STEP_LENGTH, path.reach]), path.axis)[1]
         return last and last.z
 
     def position_at(self, mechanism: Mechanism) -> FastPosition | None:
@@ -246,23 +246,23 @@ class StraightPathCache:
         if not self.setup.keeps_its_numbers(mechanism):
             return None
         stop, u1, u2 = self.setup.scaled_inputs(mechanism)
-        way = self._way_to(stop)
-        place = way.last_stride * STEP_LENGTH
-        along = _rates_along(way.axis, u1, u2)
-        kept = self._last_kept(way) if along is not None and way.reach > place else None
-        if along is None or kept is None:
+        path = self._way_to(stop)
+        place = path.last_stride * STEP_LENGTH
+        along = _rates_along(path.axis, u1, u2)
+        cached = self._last_kept(path) if along is not None and path.reach > place else None
+        if along is None or cached is None:
             return None
-        key = way.axis, way.last_stride
+        key = path.axis, path.last_stride
         known = self._step_arguments.get(key)
         if known is None:
-            u = np.array(self.start) + place * np.array(way.axis)
+            u = np.array(self.start) + place * np.array(path.axis)
             known = self._step_arguments[key] = [
-                functions.signs_at(kept.coordinates, u, self.setup.inputs.p),
-                *(part.tolist() for part in kept[:3]),
-                [*way.axis],
+                functions.signs_at(cached.coordinates, u, self.setup.inputs.p),
+                *(part.tolist() for part in cached[:3]),
+                [*path.axis],
                 *(part.tolist() for part in self.setup.acceptance_scales),
             ]
-        values = _step_formula(functions).values(*known, [way.reach - place, *along], stop)
+        values = _step_formula(functions).values(*known, [path.reach - place, *along], stop)
         keeps_branch, greatest_move, *of_result = values[: RESULT_COUNT + 2]
         result: AcceptanceResult[float] = AcceptanceResult(*of_result)
         is_regular = greatest_move <= SETTLED_STEP and result.least_singular_value > MIN_SINGULAR_VALUE
@@ -271,30 +271,30 @@ class StraightPathCache:
         return FastPosition(np.array(values[RESULT_COUNT + 2 :]).reshape(ORDERS, -1), result.residual)
 
     def _way_to(self, stop: Sequence[float]) -> _KeptWay:
-        way = [there - here for there, here in zip(stop, self.start, strict=True)]
-        reach = max(map(abs, way), default=0.0)
-        return _KeptWay(tuple([gone / reach for gone in way]) if reach else (), reach, int(reach / STEP_LENGTH))
+        direction = [end - start for end, start in zip(stop, self.start, strict=True)]
+        reach = max(map(abs, direction), default=0.0)
+        return _KeptWay(tuple([part / reach for part in direction]) if reach else (), reach, int(reach / STEP_LENGTH))
 
-    def _last_kept(self, way: _KeptWay) -> _KeptPosition | None:
+    def _last_kept(self, path: _KeptWay) -> _KeptPosition | None:
         """The last kept position on a way; None where what leads there is not surely sound."""
-        many = way.last_stride
-        if self.setup.acceptance is None or self.setup.stops is not None or many > self.max_positions:
+        stride = path.last_stride
+        if self.setup.acceptance is None or self.setup.stops is not None or stride > self.max_positions:
             return None
-        kept = self._kept.get(way.axis)
-        if kept is None:
+        cached = self._kept.get(path.axis)
+        if cached is None:
             if len(self._kept) >= MAX_DIRECTIONS:
                 self._kept.clear()
                 self._step_arguments.clear()
-            kept = self._kept[way.axis] = {}
-        while many not in kept:
-            first = max(kept, default=0)
-            before = kept.get(first)
-            if kept and before is None:
+            cached = self._kept[path.axis] = {}
+        while stride not in cached:
+            first = max(cached, default=0)
+            before = cached.get(first)
+            if cached and before is None:
                 return None
             strides = np.arange(first, min(first + STRIDES_AT_ONCE, self.max_positions) + 1)
-            positions = self._walk(self.z if before is None else before.z, strides * STEP_LENGTH, way.axis)
-            kept.update(zip(strides.tolist(), positions, strict=True))
-        return kept.get(many)
+            positions = self._walk(self.z if before is None else before.z, strides * STEP_LENGTH, path.axis)
+            cached.update(zip(strides.tolist(), positions, strict=True))
+        return cached.get(stride)
 
     @np.errstate(all="ignore")  # of what is not finite
     def _walk(self, z: Array, places: Array, along: Sequence[float]) -> list[_KeptPosition | None]:
@@ -308,8 +308,8 @@ class StraightPathCache:
         count = _count_first(accepted)
         rates = judged.coordinate_rates[:, 1, functions.unknown_columns]
         parts = samples[:count], rates, judged.distances, judged.coordinate_rates[:, 0]
-        kept = [_KeptPosition(*of_position) for of_position in zip(*parts, strict=False)]
-        return [*kept, *[None] * (len(samples) - count)]
+        positions = [_KeptPosition(*of_position) for of_position in zip(*parts, strict=False)]
+        return [*positions, *[None] * (len(samples) - count)]
 
 
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
@@ -321,13 +321,13 @@ def _step_formula(functions: AcceptanceFunctions) -> FormulaFunction:
     blocks, distances = functions.block_count, len(functions.block_starts)
     counts = blocks, unknowns, unknowns, distances, inputs, *functions.scale_counts, 3, inputs
     instructions, (signs, z, rates, regular, axis, p, row_scale, floor, along, u) = recorded_arguments(counts)
-    gone, first, second = np.split(along, 3)
+    distance, first, second = np.split(along, 3)
     step = functions.record_step(signs, z, InputSamples(u, axis, np.zeros_like(axis)), Scales(p, row_scale, floor))
     judged = step.judged
     w, w1, w2 = judged.coordinate_rates[0]
     both = np.stack([rates, w1[functions.unknown_columns]]), np.stack([regular, judged.distances[0]])
-    ends = _ends(*both, np.array([gone]))
-    squares = gone * gone * np.sum(axis * axis, keepdims=True)
+    ends = _ends(*both, np.array([distance]))
+    squares = distance * distance * np.sum(axis * axis, keepdims=True)
     keeps = keep_branch((step.z - z)[None], *ends, squares, functions.block_starts, MIN_SINGULAR_DISTANCE_RATIO)
     results = [*keeps, *greatest_entries(np.abs(step.moves)[:, None]), *(values[0] for values in judged.result)]
     results += [*w, *(w1 * first), *(w2 * first * first + w1 * second)]

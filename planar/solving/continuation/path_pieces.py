@@ -112,8 +112,8 @@ def _pieces_by_dead_points(tracker: CurveTracker) -> Iterator[PathPiece]:
     """A walk's arcs, parted at dead points."""
     curve = tracker.curve
     if tracker.point.is_dead_point and tracker.point.curvature[-1] < 0.0:
-        here = tracker.point
-        yield PathPiece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], 1), 0.0, 0.0, 0.0, 0.0, here)
+        point = tracker.point
+        yield PathPiece(Arc(point, point, point.y, point.tangent, 1.0, point.y[None], 1), 0.0, 0.0, 0.0, 0.0, point)
     for arc in tracker.arcs():
         (first, last), before = arc.ends, arc.before
         if before.is_dead_point and arc.after.is_dead_point and abs(arc.after.y[-1] - before.y[-1]) < END_TOLERANCE:
@@ -286,8 +286,9 @@ class PeriodSearch:
         if closing is None or not closing[0].stop > ROUNDING_TOLERANCE:
             return None
         last, growth = closing
-        passed = tuple(each for each in self.tracker.passed_until(growth[-1]) if each.bifurcation.y[-1] > END_TOLERANCE)
-        started = tuple(each for each in self.tracker.passed if each.is_start)
+        passages = self.tracker.passed_until(growth[-1])
+        passed = tuple(passage for passage in passages if passage.bifurcation.y[-1] > END_TOLERANCE)
+        started = tuple(passage for passage in self.tracker.passed if passage.is_start)
         period = Period((*self._pieces[:-1], last), growth, passed, started)
         return period if self._is_closed(period) else None
 

@@ -106,22 +106,22 @@ class ArcBudget:
         return self.arcs_left >= 0 and not time_is_over()
 
 
-def next_point(curve: ImplicitCurve, here: CurvePoint, longest: float) -> tuple[CurvePoint | None, float]:
+def next_point(curve: ImplicitCurve, point: CurvePoint, longest: float) -> tuple[CurvePoint | None, float]:
     """The next point of a curve, and the step to it, no longer than `longest`; None where no step leads on.
 
     A predictor of second order, Newton's corrector; a step that turns the tangent, or that could pass a singular
     position, is halved.
     """
-    bent = max(length_of(here.curvature), 1e-300)
-    step = min(longest, FIRST_DISTANCE_RATIO * here.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
+    bent = max(length_of(point.curvature), 1e-300)
+    step = min(longest, FIRST_DISTANCE_RATIO * point.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
     while step > SHORTEST_STEP:
-        y = curve.correct(here.ahead(step), here.tangent)
+        y = curve.correct(point.ahead(step), point.tangent)
         if y is not None:
-            after = curve.point_at(y, here.tangent)
-            gone = length_of(y - here.y)
-            onwards = after.tangent @ here.tangent > MIN_TANGENT_COSINE
-            is_regular = SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
-            if onwards and is_regular and gone < MAX_CORRECTED_RATIO * step:
+            after = curve.point_at(y, point.tangent)
+            distance = length_of(y - point.y)
+            onwards = after.tangent @ point.tangent > MIN_TANGENT_COSINE
+            is_regular = SINGULAR_DISTANCE_RATIO * distance < point.regular_distance + after.regular_distance
+            if onwards and is_regular and distance < MAX_CORRECTED_RATIO * step:
                 return after, step
         step *= 0.5
     return None, step
@@ -170,7 +170,7 @@ class CurveTracker:
         equations = solver.equations
         self._is_length = ~equations.unknown_is_angle
         turns = any(
-            kind is not MeasureKind.LENGTH for kind, way in zip(equations.input_kinds, direction, strict=True) if way
+            kind is not MeasureKind.LENGTH for kind, part in zip(equations.input_kinds, direction, strict=True) if part
         )
         self.is_periodic = np.append(equations.unknown_is_angle, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
@@ -196,11 +196,11 @@ class CurveTracker:
             self.point = self._start_arc.after
             yield self._start_arc
         while True:
-            here = self.point
-            if not self.budget.spend(self.curve.inputs(here.y)):
+            point = self.point
+            if not self.budget.spend(self.curve.inputs(point.y)):
                 self.ending = TrackingEnd.INTERRUPTED if time_is_over() else TrackingEnd.WORK_LIMIT
                 return
-            if self._approaching and here.regular_distance < min(
+            if self._approaching and point.regular_distance < min(
                 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO * self._last_search_distance, self.step
             ):
                 through = list(self._arcs_through_bifurcation())
@@ -208,27 +208,27 @@ class CurveTracker:
                     yield from through
                     self.step, self._last_search_distance, self._approaching = FIRST_STEP, np.inf, False
                     continue
-            elif here.regular_distance > SEARCH_DISTANCE:
+            elif point.regular_distance > SEARCH_DISTANCE:
                 self._last_search_distance = np.inf
-            out = self._slide_extent(here.y)
-            after = None if out > farthest else self._next_point()
-            if after is not None and out > MAX_TURNING_EXTENT and here.input_rate * after.input_rate <= 0.0:
-                self.limit, self.ending = float(here.y[-1]), TrackingEnd.ENDLESS
+            extent = self._slide_extent(point.y)
+            after = None if extent > farthest else self._next_point()
+            if after is not None and extent > MAX_TURNING_EXTENT and point.input_rate * after.input_rate <= 0.0:
+                self.limit, self.ending = float(point.y[-1]), TrackingEnd.ENDLESS
                 return
             if after is None:
                 self.limit = (
-                    _input_limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._is_length)))
-                    if out > SHOWN_SLIDE_EXTENT
+                    _input_limit(point, int(np.argmax(np.abs(point.y[:-1]) * self._is_length)))
+                    if extent > SHOWN_SLIDE_EXTENT
                     else None
                 )
                 if self.limit is not None:
                     self.ending = TrackingEnd.ENDLESS
-                elif out > farthest:
+                elif extent > farthest:
                     self.ending = TrackingEnd.OUT_OF_RANGE
                 return
             self._update_nearby(after)
-            self._approaching = after.regular_distance < here.regular_distance
-            arc = arc_between(here, after)
+            self._approaching = after.regular_distance < point.regular_distance
+            arc = arc_between(point, after)
             if self.far_point is None and self._slide_extent(after.y) > shown:
 
                 def beyond(x: float, arc: Arc = arc) -> float:
@@ -247,21 +247,21 @@ class CurveTracker:
         """Start by the way of the next number where that is asked for and the start is a change point."""
         if not (self.branches and self.point.regular_distance < AT_BIFURCATION_DISTANCE):
             return
-        found = bifurcation_at_start(self.curve, self.point.y)
-        if found is None:
+        bifurcation = bifurcation_at_start(self.curve, self.point.y)
+        if bifurcation is None:
             return
         number = self.branches[0]
-        index = min(number, len(found.branches)) - 1
-        branch = found.branches[index]
-        arc = branch_crossing(self.curve, branch, found.rank_loss)
+        index = min(number, len(bifurcation.branches)) - 1
+        branch = bifurcation.branches[index]
+        arc = branch_crossing(self.curve, branch, bifurcation.rank_loss)
         if arc is not None:
             del self.branches[0]
             self.point, self._start_arc = branch, arc._replace(before=branch)
-            self._note_passed(found, index, is_start=True, beyond=number > len(found.branches))
+            self._note_passed(bifurcation, index, is_start=True, beyond=number > len(bifurcation.branches))
 
-    def _note_passed(self, found: Bifurcation, index: int, is_start: bool, beyond: bool) -> None:
-        direction = self.curve.input_direction
-        self.passed.append(PassedBifurcation(found, index, self.curve.inputs(found.y), direction, is_start, beyond))
+    def _note_passed(self, bifurcation: Bifurcation, index: int, is_start: bool, beyond: bool) -> None:
+        u, direction = self.curve.inputs(bifurcation.y), self.curve.input_direction
+        self.passed.append(PassedBifurcation(bifurcation, index, u, direction, is_start, beyond))
 
     def passed_until(self, last: float = np.inf) -> tuple[PassedBifurcation, ...]:
         """The change points passed up to a place of the inputs on their way."""
@@ -283,67 +283,68 @@ class CurveTracker:
 
     def _next_point(self) -> CurvePoint | None:
         """The next point, as far ahead as the curve and slides that are far out allow."""
-        here, curve = self.point, self.curve
+        point, curve = self.point, self.curve
         # far out a step of a slide may be longer, but not that of an angle
-        out = max(self._slide_extent(here.y), 0.0 if self.is_periodic[-1] else abs(float(here.y[-1])))
-        turning = greatest_size(here.tangent[self.is_periodic])
-        longest = LONGEST_STEP / max(turning, min(1.0, NEAR_SLIDE_EXTENT / max(out, 1.0)))
+        extent = max(self._slide_extent(point.y), 0.0 if self.is_periodic[-1] else abs(float(point.y[-1])))
+        turning = greatest_size(point.tangent[self.is_periodic])
+        longest = LONGEST_STEP / max(turning, min(1.0, NEAR_SLIDE_EXTENT / max(extent, 1.0)))
         step = min(self.step, longest)
-        after, taken = next_point(curve, here, step)
+        after, taken = next_point(curve, point, step)
         if after is not None:
             self.step = STEP_GROWTH * taken
         return after
 
     def _arcs_through_bifurcation(self) -> Iterator[Arc]:
         """The arcs through a change point that lies just ahead, if one does."""
-        here = self.point
-        self._last_search_distance = here.regular_distance
-        found = self._bifurcation_ahead(here)
-        if found is None:
+        point = self.point
+        self._last_search_distance = point.regular_distance
+        bifurcation = self._bifurcation_ahead(point)
+        if bifurcation is None:
             return
         number = self.branches.pop(0) if self.branches else 1
-        options = outgoing_branches(found, here)
+        options = outgoing_branches(bifurcation, point)
         coming, (index, leaving) = options[0][1], options[min(number, len(options)) - 1]
-        inwards, outwards = (branch_crossing(self.curve, branch, found.rank_loss) for branch in (coming, leaving))
+        inwards, outwards = (branch_crossing(self.curve, branch, bifurcation.rank_loss) for branch in (coming, leaving))
         if inwards is None or outwards is None:
             return
-        if float(coming.tangent @ (here.y - inwards.before.y)) < 0.0:
-            yield arc_between(here, inwards.before)
-            here = inwards.before
-        self._note_passed(found, index, is_start=False, beyond=number > len(options))
-        yield inwards._replace(before=here, after=coming)
+        if float(coming.tangent @ (point.y - inwards.before.y)) < 0.0:
+            yield arc_between(point, inwards.before)
+            point = inwards.before
+        self._note_passed(bifurcation, index, is_start=False, beyond=number > len(options))
+        yield inwards._replace(before=point, after=coming)
         yield outwards._replace(before=leaving)
         self.point = outwards.after
 
-    def _bifurcation_ahead(self, here: CurvePoint) -> Bifurcation | None:
+    def _bifurcation_ahead(self, point: CurvePoint) -> Bifurcation | None:
         """The change point that lies just ahead; those of neighbouring linkages are noted."""
-        curve, farthest = self.curve, max(MAX_AHEAD_RATIO * here.regular_distance, SEARCH_DISTANCE)
-        for near in bifurcation_candidates(curve, here, farthest):
-            away = float(np.linalg.norm(near.y - here.y))
-            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > farthest:
+        curve, farthest = self.curve, max(MAX_AHEAD_RATIO * point.regular_distance, SEARCH_DISTANCE)
+        for near in bifurcation_candidates(curve, point, farthest):
+            distance = float(np.linalg.norm(near.y - point.y))
+            if not float(point.tangent @ (near.y - point.y)) > 0.0 or distance > farthest:
                 continue
             if near.residual > curve.solver.tolerance or not curve.is_closed(near.y):
-                self.nearby = [each for each in self.nearby if np.linalg.norm(each.y - near.y) > 1e-6]
-                self.nearby.append(NearbyBifurcation(near.y, away, near.residual))
+                self.nearby = [other for other in self.nearby if np.linalg.norm(other.y - near.y) > 1e-6]
+                self.nearby.append(NearbyBifurcation(near.y, distance, near.residual))
                 continue
-            found = bifurcation_ahead(curve, here, near.y)
-            if found is not None:
-                return found
+            bifurcation = bifurcation_ahead(curve, point, near.y)
+            if bifurcation is not None:
+                return bifurcation
         return None
 
     def _update_nearby(self, after: CurvePoint) -> None:
         """How near the walk comes to change points of neighbouring linkages."""
-        for k, each in enumerate(self.nearby):
-            self.nearby[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
+        for k, near in enumerate(self.nearby):
+            distance = float(np.linalg.norm(after.y - near.y))
+            self.nearby[k] = near._replace(distance=min(near.distance, distance))
 
 
-def _input_limit(here: CurvePoint, slide: int) -> float | None:
+def _input_limit(point: CurvePoint, slide: int) -> float | None:
     """The place to which the inputs tend as a slide goes out without an end; None where they go on with it.
 
     Far out t = limit + c s^-k, of which the first and second derivative by s tell k and the rest of the way.
     """
-    s, s1, s2 = here.y[slide], here.tangent[slide], here.curvature[slide]
-    t, t1, t2 = here.y[-1], here.tangent[-1], here.curvature[-1]
+    s, s1, s2 = point.y[slide], point.tangent[slide], point.curvature[slide]
+    t, t1, t2 = point.y[-1], point.tangent[-1], point.curvature[-1]
     if s * s1 <= 0.0:
         return None
     first, second = t1 / s1, (t2 * s1 - t1 * s2) / s1**3
@@ -353,14 +354,14 @@ def _input_limit(here: CurvePoint, slide: int) -> float | None:
     return float(t + s * first / power) if power > MIN_LIMIT_POWER else None
 
 
-def outgoing_branches(found: Bifurcation, here: CurvePoint) -> list[tuple[int, CurvePoint]]:
+def outgoing_branches(bifurcation: Bifurcation, point: CurvePoint) -> list[tuple[int, CurvePoint]]:
     """The ways on from a change point with their numbers: the smooth one first, then by the angle from it.
 
     Of another way the direction in which the inputs go on as they came; both where they rest on it.
     """
-    smooth = found.branches[0].towards(here.tangent)
+    smooth = bifurcation.branches[0].towards(point.tangent)
     options = [(0, smooth)]
-    for index, branch in enumerate(found.branches[1:], 1):
+    for index, branch in enumerate(bifurcation.branches[1:], 1):
         options += [
             (index, option) for option in (branch, branch.reversed()) if option.input_rate * smooth.input_rate >= -1e-9
         ]

@@ -106,58 +106,58 @@ class ImplicitCurve:
     def point_at(self, y: Array, towards: Array, with_distance: bool = True) -> CurvePoint:
         """The point at y, its tangent less than a right angle from a direction; its regular distance is not a number
         where it is not asked for."""
-        slope = self.jacobian(y)
-        if isinstance(slope, SparseMatrices):
-            point = self._sparse_point_at(y, towards, slope, with_distance)
+        jacobian = self.jacobian(y)
+        if isinstance(jacobian, SparseMatrices):
+            point = self._sparse_point_at(y, towards, jacobian, with_distance)
             if point is not None:
                 return point
-            slope = np.asarray(slope)
-        least = self._least_singular_value(slope)
-        many = len(y) - 1
-        if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
-            system = stack_row(slope, towards)
-            tangent = _solve_regular(system, input_axis(many + 1))
+            jacobian = np.asarray(jacobian)
+        least = self._least_singular_value(jacobian)
+        n = len(y) - 1
+        if len(jacobian) == n and least > REGULAR_SINGULAR_VALUE:
+            system = stack_row(jacobian, towards)
+            tangent = _solve_regular(system, input_axis(n + 1))
             size = np.inf if tangent is None else length_of(tangent)
             if tangent is not None and size * length_of(towards) < MAX_TANGENT_RATIO:
                 tangent /= size
-                system[many] = tangent
-                bend = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
-                distance = self._regular_distance(y, tangent, slope, least) if with_distance else np.nan
-                return CurvePoint(y, tangent, bend, distance)
-        u, s, vt = np.linalg.svd(slope)
-        tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
-        kept = s[:many] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
-        along = (u.T[:many] @ self.second_derivative(y, tangent)) if many else np.zeros(0)
-        bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
-        return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
+                system[n] = tangent
+                curvature = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
+                distance = self._regular_distance(y, tangent, jacobian, least) if with_distance else np.nan
+                return CurvePoint(y, tangent, curvature, distance)
+        u, s, vt = np.linalg.svd(jacobian)
+        tangent = vt[n] if vt[n] @ towards >= 0.0 else -vt[n]
+        is_nonzero = s[:n] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if n else np.zeros(0, dtype=bool)
+        along = (u.T[:n] @ self.second_derivative(y, tangent)) if n else np.zeros(0)
+        curvature = -vt[:n].T @ np.where(is_nonzero, along / np.where(is_nonzero, s[:n], 1.0), 0.0)
+        return CurvePoint(y, tangent, curvature, self._regular_distance(y, tangent, jacobian, least))
 
     def _sparse_point_at(
-        self, y: Array, towards: Array, slope: SparseMatrices, with_distance: bool
+        self, y: Array, towards: Array, jacobian: SparseMatrices, with_distance: bool
     ) -> CurvePoint | None:
         """The same of many unknowns; None where all singular values have to be looked at."""
         try:
-            bordered = BorderedJacobian(slope, towards)
+            bordered = BorderedJacobian(jacobian, towards)
         except ValueError:
             return None
-        sizes = slope.column_norms(MIN_COLUMN_NORM)
+        sizes = jacobian.column_norms(MIN_COLUMN_NORM)
         least = bordered.least_singular_value(sizes)
         if not (least > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
             return None
         tangent = bordered.tangent
-        bend = bordered.step(-self.second_derivative(y, tangent), tangent)
+        curvature = bordered.step(-self.second_derivative(y, tangent), tangent)
         distance = self._sparse_regular_distance(y, bordered, sizes, least) if with_distance else np.nan
-        return CurvePoint(y, tangent, bend, distance)
+        return CurvePoint(y, tangent, curvature, distance)
 
     def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
         """The same as `_regular_distance`."""
         return np.inf
 
-    def _least_singular_value(self, slope: Array) -> float:
+    def _least_singular_value(self, jacobian: Array) -> float:
         """The least singular value of J, columns of one size, so that a small link counts as much as a large one."""
-        many = slope.shape[1] - 1
-        if many == 0:
+        n = jacobian.shape[1] - 1
+        if n == 0:
             return 1.0
-        return float(np.linalg.svd(slope / column_norms(slope, MIN_COLUMN_NORM), compute_uv=False)[many - 1])
+        return float(np.linalg.svd(jacobian / column_norms(jacobian, MIN_COLUMN_NORM), compute_uv=False)[n - 1])
 
     def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
         """How far along the curve J is known to keep its rank: not asked of a curve that may cross others."""
@@ -166,12 +166,12 @@ class ImplicitCurve:
     def correct(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
 
-        def step(slope: Array | SparseMatrices, left: Array) -> Array:
-            if isinstance(slope, SparseMatrices):
-                sparse = _sparse_step(slope, left, normal)
+        def step(jacobian: Array | SparseMatrices, residuals: Array) -> Array:
+            if isinstance(jacobian, SparseMatrices):
+                sparse = _sparse_step(jacobian, residuals, normal)
                 if sparse is not None:
                     return sparse
-            return _solve_shortest(stack_row(np.asarray(slope), normal), append_number(-left, 0.0))
+            return _solve_shortest(stack_row(np.asarray(jacobian), normal), append_number(-residuals, 0.0))
 
         y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
         return y if gap <= CLOSED_TOLERANCE * max(1.0, greatest_size(y)) else None
@@ -202,16 +202,16 @@ class SolutionCurve(ImplicitCurve):
 
     def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and J (rows, n + 1)."""
-        left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
+        residuals, jacobian = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
         if self._is_along_input:
-            return left, slope
-        if isinstance(slope, SparseMatrices):
-            return left, slope.join_last_columns(self.input_direction)
-        many = len(y) - 1
-        narrow = np.empty((len(slope), many + 1))
-        narrow[:, :many] = slope[:, :many]
-        narrow[:, many] = slope[:, many:] @ self.input_direction
-        return left, narrow
+            return residuals, jacobian
+        if isinstance(jacobian, SparseMatrices):
+            return residuals, jacobian.join_last_columns(self.input_direction)
+        n = len(y) - 1
+        narrow = np.empty((len(jacobian), n + 1))
+        narrow[:, :n] = jacobian[:, :n]
+        narrow[:, n] = jacobian[:, n:] @ self.input_direction
+        return residuals, narrow
 
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
@@ -238,7 +238,7 @@ class SolutionCurve(ImplicitCurve):
         """Whether a point passes the residual check."""
         return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance
 
-    def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
 
         Constraints that nearly depend on one another all along keep J near a singular one, but do not bring it nearer.
@@ -248,37 +248,37 @@ class SolutionCurve(ImplicitCurve):
         """
         if len(y) == 1:
             return np.inf
-        sizes = column_norms(slope, MIN_COLUMN_NORM)
-        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - slope) / (sizes * DIFFERENCE_STEP)
-        clear = float(singular_distance(least, np.linalg.norm(change)))
-        if clear >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
-            return clear
-        turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
-        return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
+        sizes = column_norms(jacobian, MIN_COLUMN_NORM)
+        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - jacobian) / (sizes * DIFFERENCE_STEP)
+        distance = float(singular_distance(least, np.linalg.norm(change)))
+        if distance >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
+            return distance
+        relative = np.linalg.lstsq(jacobian / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
+        return max(distance, 1.0 / max(float(np.linalg.norm(relative)), 1e-300))
 
     def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
-        slope, tangent = bordered.jacobian, bordered.tangent
-        there = self.jacobian(y + DIFFERENCE_STEP * tangent)
-        assert isinstance(there, SparseMatrices)
-        change = SparseMatrices(slope.pattern, (there.values - slope.values) / DIFFERENCE_STEP)
-        clear = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
-        if clear >= SHORT_REGULAR_DISTANCE:
-            return clear
-        return max(clear, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
+        jacobian, tangent = bordered.jacobian, bordered.tangent
+        ahead = self.jacobian(y + DIFFERENCE_STEP * tangent)
+        assert isinstance(ahead, SparseMatrices)
+        change = SparseMatrices(jacobian.pattern, (ahead.values - jacobian.values) / DIFFERENCE_STEP)
+        distance = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
+        if distance >= SHORT_REGULAR_DISTANCE:
+            return distance
+        return max(distance, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
 
     def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
         `rank_loss` is by how much the Jacobian's rank falls at the change point; the inputs move only `with_inputs`.
         """
-        many = len(y) - 1
-        return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)
+        n = len(y) - 1
+        return correct_at_rank(self.residuals_and_jacobian, y, n - rank_loss, n + with_inputs)
 
 
-def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | None:
+def _sparse_step(jacobian: SparseMatrices, residuals: Array, normal: Array) -> Array | None:
     """The step that closes what is open, normal to a direction; None where it is that of a singular system."""
     try:
-        step = BorderedJacobian(slope, normal).step(-left)
+        step = BorderedJacobian(jacobian, normal).step(-residuals)
     except ValueError:
         return None
     return step if greatest_size(step) < MAX_SOLVED_STEP else None
@@ -287,9 +287,9 @@ def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | N
 def _solve_shortest(system: Array, known: Array) -> Array:
     """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
     if system.shape[0] == system.shape[1]:
-        found = _solve_regular(system, known)
-        if found is not None and greatest_size(found) < MAX_SOLVED_STEP:
-            return found
+        solution = _solve_regular(system, known)
+        if solution is not None and greatest_size(solution) < MAX_SOLVED_STEP:
+            return solution
     return np.linalg.lstsq(system, known, rcond=1e-14)[0]
 
 
@@ -367,18 +367,18 @@ class Arc(NamedTuple):
 
     def input_position(self, x: float) -> float:
         """How far the inputs are on their way so far along the axis, by the polynomial."""
-        part, found = x / self.unit_length, 0.0
+        part, value = x / self.unit_length, 0.0
         for coefficient in reversed(self.coefficients[:, -1].tolist()):
-            found = found * part + coefficient
-        return found
+            value = value * part + coefficient
+        return value
 
     def curve_coordinates(self, curve: SolutionCurve, x: float) -> Array:
         """The point of the curve so far along the axis (n + 1,)."""
         rough = self.polynomial(x)
         if self.is_exact:
             return curve.correct_beside_bifurcation(rough, self.rank_loss, with_inputs=True)
-        found = curve.correct(rough, self.axis)
-        return rough if found is None else found
+        y = curve.correct(rough, self.axis)
+        return rough if y is None else y
 
     def point_at(self, curve: SolutionCurve, x: float, with_distance: bool = True) -> CurvePoint:
         """The point of the curve so far along the axis, with its tangent; see `ImplicitCurve.point_at`."""
@@ -388,9 +388,9 @@ class Arc(NamedTuple):
         first, second = self.polynomial(x, 1), self.polynomial(x, 2)
         speed = float(np.linalg.norm(first))
         tangent = first / speed
-        bend = (second - tangent * (tangent @ second)) / speed**2
+        curvature = (second - tangent * (tangent @ second)) / speed**2
         sense = 1.0 if tangent @ self.before.tangent >= 0.0 else -1.0
-        return CurvePoint(y, sense * tangent, bend, 0.0)
+        return CurvePoint(y, sense * tangent, curvature, 0.0)
 
 
 def arc_between(before: CurvePoint, after: CurvePoint) -> Arc:

@@ -64,43 +64,43 @@ def sample_rates(
     weak[list(known)] = False
     strong[list(known)] = False
 
-    def solved(left: Array, order: int) -> Array:
-        found = np.full(z.shape, np.nan)
+    def solved(residuals: Array, order: int) -> Array:
+        motion = np.full(z.shape, np.nan)
         if strong.any():
-            found[strong] = -solve_vectors(rest.jacobian[strong], left[strong])
+            motion[strong] = -solve_vectors(rest.jacobian[strong], residuals[strong])
         for index, each in known.items():
-            slope, guess = rest.jacobian[index], each[order - 1]
-            found[index] = guess - truncated_step(
-                slope, left[index] + slope @ guess, z.shape[1] - branch_rates[index].rank_loss
+            jacobian, guess = rest.jacobian[index], each[order - 1]
+            motion[index] = guess - truncated_step(
+                jacobian, residuals[index] + jacobian @ guess, z.shape[1] - branch_rates[index].rank_loss
             )
-        return found
+        return motion
 
     z1 = solved(rest.F1, 1)
     y1 = whole(z1, inputs.u1)
     z2 = solved(program.kinematics(y, y1, whole(none, inputs.u2), p).F2, 2)
     y2 = whole(z2, inputs.u2)
-    found = program.kinematics(y, y1, y2, p)
-    parts, sure = [found.w, found.w1, found.w2], np.flatnonzero(strong)
+    motion = program.kinematics(y, y1, y2, p)
+    parts, sure = [motion.w, motion.w1, motion.w2], np.flatnonzero(strong)
     if with_jerk:
         z3 = solved(program.third_residual_rates((y, y1, y2, whole(none, inputs.u3)), p), 3)
         parts.append(program.third_coordinate_rates((y, y1, y2, whole(z3, inputs.u3)), p))
     for part in parts[1:]:
         part[weak] = np.nan
     found_doubts = (
-        find_accuracy_doubts(setup, rest.jacobian[sure], found.w[sure], y[sure], y1[sure], y2[sure])
+        find_accuracy_doubts(setup, rest.jacobian[sure], motion.w[sure], y[sure], y1[sure], y2[sure])
         if sure.size
         else None
     )
     return SampleRates(parts, found_doubts and found_doubts._replace(rows=sure[found_doubts.rows]))
 
 
-def _rates_in_time(branch_rates: BranchRates, given: InputRates, index: int) -> Array | None:
+def _rates_in_time(branch_rates: BranchRates, inputs: InputRates, index: int) -> Array | None:
     """Rates in time (3, unknowns) from those along a way; None where the inputs do not run along it."""
-    way, size = branch_rates.input_direction, float(branch_rates.input_direction @ branch_rates.input_direction)
+    direction, size = branch_rates.input_direction, float(branch_rates.input_direction @ branch_rates.input_direction)
     along = []
-    for rate in (given.u1[index], given.u2[index], given.u3[index]):
-        part = float(rate @ way) / size
-        if np.max(np.abs(rate - part * way)) > DIRECTION_TOLERANCE * max(1.0, float(np.max(np.abs(rate)))):
+    for rate in (inputs.u1[index], inputs.u2[index], inputs.u3[index]):
+        part = float(rate @ direction) / size
+        if np.max(np.abs(rate - part * direction)) > DIRECTION_TOLERANCE * max(1.0, float(np.max(np.abs(rate)))):
             return None
         along.append(part)
     t1, t2, t3 = along
@@ -143,10 +143,10 @@ class AccuracyDoubts(NamedTuple):
 
     def remark(self, where: str = "") -> str:
         """What there is to say of those that are accurate enough, at a place in words; nothing where there are none."""
-        kept = np.flatnonzero(~self.errors.is_too_inexact)
-        if not kept.size:
+        exact = np.flatnonzero(~self.errors.is_too_inexact)
+        if not exact.size:
             return ""
-        worst = int(kept[np.argmax(self.errors.greatest[kept])])
+        worst = int(exact[np.argmax(self.errors.greatest[exact])])
         digits = max(int(-np.log10(self.errors.greatest[worst])), 1)
         return f"rounding leaves {count_phrase(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}"
 
@@ -167,38 +167,38 @@ def find_accuracy_doubts(
 
     slope (samples, rows, unknowns), w (samples, coordinates) in sizes.
     """
-    lost, stages, arms = _error_amplification(setup, jacobian)
+    amplification, stages, arms = _error_amplification(setup, jacobian)
     counted = np.maximum(np.abs(w).max(axis=1, initial=0.0) / np.pi, 1.0)
     # what is not a number is not below anything
-    rows = np.flatnonzero(~(EPS * lost * counted <= NEGLIGIBLE_ERROR))
+    rows = np.flatnonzero(~(EPS * amplification * counted <= NEGLIGIBLE_ERROR))
     if not rows.size:
         return None
-    found = rate_errors(setup, y[rows], y1[rows], y2[rows])
-    sure = found.greatest <= NEGLIGIBLE_ERROR
-    rows, found = rows[~sure], RateErrors(*(each[~sure] for each in found))
+    errors = rate_errors(setup, y[rows], y1[rows], y2[rows])
+    is_exact = errors.greatest <= NEGLIGIBLE_ERROR
+    rows, errors = rows[~is_exact], RateErrors(*(error[~is_exact] for error in errors))
     if not rows.size:
         return None
     causes = [_cause(setup, w[row], float(counted[row]), int(stages[row]), arms[row]) for row in rows]
-    return AccuracyDoubts(rows, found, causes)
+    return AccuracyDoubts(rows, errors, causes)
 
 
-def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, IntArray, Array]:
+def _error_amplification(setup: PreparedMechanism, jacobian: Array) -> tuple[Array, IntArray, Array]:
     """By how much round-off is greater in the rates at most, and in which group (samples,); the arm of every unknown.
 
     A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the group is nearly
     singular; rates that are made of such angles lose as much once more.
     """
-    found, which = np.ones(len(slope)), np.zeros(len(slope), dtype=int)
-    strong, arms = regularity(setup, slope), np.ones((len(slope), slope.shape[2]))
+    greatest, which = np.ones(len(jacobian)), np.zeros(len(jacobian), dtype=int)
+    strong, arms = regularity(setup, jacobian), np.ones((len(jacobian), jacobian.shape[2]))
     for index, stage in enumerate(setup.equations.blocks):
-        own = slope[:, stage.rows, stage.unknowns]
-        if own.shape[-1]:
-            arms[:, stage.unknowns] = np.linalg.norm(own, axis=1)
+        block_jacobian = jacobian[:, stage.rows, stage.unknowns]
+        if block_jacobian.shape[-1]:
+            arms[:, stage.unknowns] = np.linalg.norm(block_jacobian, axis=1)
             least = arms[:, stage.unknowns].min(axis=1)
-            lost = 1.0 / np.maximum(least * strong[:, index] ** 2, SMALLEST_NORMAL)
-            which = np.where(lost > found, index, which)
-            found = np.maximum(found, lost)
-    return found, which, arms
+            amplification = 1.0 / np.maximum(least * strong[:, index] ** 2, SMALLEST_NORMAL)
+            which = np.where(amplification > greatest, index, which)
+            greatest = np.maximum(greatest, amplification)
+    return greatest, which, arms
 
 
 def _cause(setup: PreparedMechanism, w: Array, counted: float, stage: int, arms: Array) -> tuple[str, str]:
@@ -210,8 +210,8 @@ def _cause(setup: PreparedMechanism, w: Array, counted: float, stage: int, arms:
         if worst.kind is MeasureKind.LENGTH:
             return f"{worst.owner!r} is {size} times as far away as the mechanism is large", "bring them nearer"
         return f"the angle of link {worst.owner!r} counts up to {size} rad", "start from fewer turns"
-    own = e.blocks[stage].unknowns
-    k = own.start + int(np.argmin(arms[own])) if own.stop > own.start else 0
+    unknowns = e.blocks[stage].unknowns
+    k = unknowns.start + int(np.argmin(arms[unknowns])) if unknowns.stop > unknowns.start else 0
     if arms.size and arms[k] < SHORT_ARM:
         link = e.coordinates[e.unknowns[k]].owner
         return (
@@ -263,11 +263,11 @@ def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Arra
     judged by what moves it, and one that is slow because all is slow around it by that.
     """
     e = setup.equations
-    many = len(e.unknowns)
-    angles = np.append(e.unknown_is_angle, np.ones(y1.shape[1] - many, dtype=bool))
+    unknown_count = len(e.unknowns)
+    angles = np.append(e.unknown_is_angle, np.ones(y1.shape[1] - unknown_count, dtype=bool))
     one, two = y1.copy(), np.maximum(y2, y1 * y1 * angles)
     for stage in e.blocks:
-        own = slice(stage.unknowns.start, stage.unknowns.stop)
+        unknowns = slice(stage.unknowns.start, stage.unknowns.stop)
         block = slope[:, stage.rows]
         names = [row.pair for row in e.rows[stage.rows]]
         alike = np.array([[a == b for b in names] for a in names], dtype=bool).reshape(len(names), len(names))
@@ -276,13 +276,13 @@ def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Arra
                 terms = (block * pace[:, None]).max(axis=2, initial=0.0)
                 # both rows of a pin: what moves along one axis now moves along the other in a while
                 terms = np.where(alike, terms[:, None], 0.0).max(axis=2, initial=0.0)
-                arms = np.sqrt((alike @ (block[:, :, own] ** 2)).clip(SMALLEST_NORMAL))
-                could = np.where(block[:, :, own] > 0.0, terms[:, :, None] / arms, 0.0).max(axis=1, initial=0.0)
-                grown = np.maximum(pace[:, own], could)
-                if np.all(grown <= 2.0 * pace[:, own]):
+                arms = np.sqrt((alike @ (block[:, :, unknowns] ** 2)).clip(SMALLEST_NORMAL))
+                could = np.where(block[:, :, unknowns] > 0.0, terms[:, :, None] / arms, 0.0).max(axis=1, initial=0.0)
+                grown = np.maximum(pace[:, unknowns], could)
+                if np.all(grown <= 2.0 * pace[:, unknowns]):
                     break
-                pace[:, own] = grown
-        two[:, own] = np.maximum(two[:, own], one[:, own] ** 2 * angles[own])
+                pace[:, unknowns] = grown
+        two[:, unknowns] = np.maximum(two[:, unknowns], one[:, unknowns] ** 2 * angles[unknowns])
     return one, two
 
 

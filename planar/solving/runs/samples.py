@@ -127,32 +127,32 @@ def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> CheckedRat
 def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_part: bool) -> CheckedRates:
     """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer. The rows
     may be a part of a run whose other rows have rates."""
-    z, given = run.z, run.inputs
-    gaps = solver.residuals(z, given.u)
+    z, inputs = run.z, run.inputs
+    gaps = solver.residuals(z, inputs.u)
     residual = float(gaps.max(initial=0.0))
     if not residual <= solver.tolerance:
         open_row, worst = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         raise refusals.not_closed(
-            solver, solver.row_pairs[open_row], residual, f"at {solver.describe_inputs(given.u[worst])}"
+            solver, solver.row_pairs[open_row], residual, f"at {solver.describe_inputs(inputs.u[worst])}"
         )
-    parts, doubt = sample_rates(solver, z, given, run.branch_rates, with_jerk)
+    parts, doubt = sample_rates(solver, z, inputs, run.branch_rates, with_jerk)
     remarks = _undetermined_remark(solver, run, parts[1])
     for part in parts[1:]:
         # where the input turns back, no velocity of the rest goes with one of the input
         part[list(run.dead_points)] = np.nan
     if doubt is not None:
-        remarks += _remove_inexact_rates(solver, given, parts, doubt, is_part)
+        remarks += _remove_inexact_rates(solver, inputs, parts, doubt, is_part)
     frames, own = lazy_frames(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
-    inputs = [Jet(*rates) for rates in _input_motions(solver, given)]
-    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, inputs)
+    jets = [Jet(*rates) for rates in _input_motions(solver, inputs)]
+    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, jets)
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
         of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
         wrong = of_rows > 1e3 * solver.tolerance
         if not wrong.any():
             continue
         row = int(np.argmax(of_rows))
-        at = f"at {solver.describe_inputs(given.u[row])}"
+        at = f"at {solver.describe_inputs(inputs.u[row])}"
         if wrong[determined].all() and not is_part:
             raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
         for part in parts[1:]:
@@ -169,19 +169,19 @@ def _undetermined_remark(solver: PositionSolver, run: RunSamples, w1: Array) -> 
     if not missing.size:
         return ()
     row = missing[0]
-    there = tuple(
-        Drive(each.pair, float(at) * (solver.unit if solver.is_sliding(each.pair) else 1.0))
-        for each, at in zip(solver.mechanism.inputs, run.inputs.u[row], strict=True)
+    drives = tuple(
+        Drive(driven.pair, float(position) * (solver.unit if solver.is_sliding(driven.pair) else 1.0))
+        for driven, position in zip(solver.mechanism.inputs, run.inputs.u[row], strict=True)
     )
     try:
-        solver.with_inputs_of(replace_inputs(solver.mechanism, there)).state(run.z[row])
+        solver.with_inputs_of(replace_inputs(solver.mechanism, drives)).state(run.z[row])
     except NoAnswer as problem:
         return (f"{count_phrase(len(missing), 'row')} without rates: {problem.reason}",)
     return ()
 
 
 def _remove_inexact_rates(
-    solver: PositionSolver, given: InputRates, parts: list[Array], doubt: AccuracyDoubts, is_part: bool
+    solver: PositionSolver, inputs: InputRates, parts: list[Array], doubt: AccuracyDoubts, is_part: bool
 ) -> tuple[str, ...]:
     """What to say of rows of which rounding leaves few digits; the rates of those with too few taken away.
 
@@ -191,19 +191,19 @@ def _remove_inexact_rates(
     if lost.any():
         worst = int(np.argmax(np.where(lost, np.nan_to_num(doubt.errors.greatest, nan=np.inf), 0.0)))
         places = ~(doubt.errors.position <= MAX_RATE_ERROR)
-        some = doubt.rows[lost]
+        inexact_rows = doubt.rows[lost]
         rows_with_rates = int((~np.isnan(parts[1]).any(axis=1)).sum())
-        if places.any() or (len(some) == rows_with_rates and not is_part):
+        if places.any() or (len(inexact_rows) == rows_with_rates and not is_part):
             k = int(np.argmax(places)) if places.any() else worst
-            raise doubt.refusal(solver, k, f"at {solver.describe_inputs(given.u[doubt.rows[k]])}")
+            raise doubt.refusal(solver, k, f"at {solver.describe_inputs(inputs.u[doubt.rows[k]])}")
         for part in parts[1:]:
-            part[some] = np.nan
-        told = doubt.refusal(solver, worst, f"at {solver.describe_inputs(given.u[doubt.rows[worst]])}").reason
-        remarks.append(f"{count_phrase(len(some), 'row')} without rates: {told}")
-    kept = np.flatnonzero(~lost)
-    if kept.size:
-        row = doubt.rows[kept[np.argmax(doubt.errors.greatest[kept])]]
-        remarks.append(doubt.remark(f" at {solver.describe_inputs(given.u[row])}"))
+            part[inexact_rows] = np.nan
+        reason = doubt.refusal(solver, worst, f"at {solver.describe_inputs(inputs.u[doubt.rows[worst]])}").reason
+        remarks.append(f"{count_phrase(len(inexact_rows), 'row')} without rates: {reason}")
+    exact = np.flatnonzero(~lost)
+    if exact.size:
+        row = doubt.rows[exact[np.argmax(doubt.errors.greatest[exact])]]
+        remarks.append(doubt.remark(f" at {solver.describe_inputs(inputs.u[row])}"))
     return tuple(remarks)
 
 
