@@ -45,53 +45,44 @@ def sample_rates(
 
     NaN where none is determined: at dead points. At change points they are those of the branch that was followed.
     """
-    program, p, none = setup.functions, setup.inputs.p, np.zeros_like(z)
+    functions, p, rest = setup.functions, setup.inputs.p, np.zeros_like(z)
     y = np.hstack([z, inputs.u])
-
-    def whole(rate: Array, of_inputs: Array) -> Array:
-        return np.hstack([rate, of_inputs])
-
-    rest = program.kinematics(y, whole(none, inputs.u1), whole(none, inputs.u2), p)
-    strength = regularity(setup, rest.jacobian).min(axis=-1, initial=1.0)
-    strong = strength >= MIN_REGULARITY
+    at_rest = functions.kinematics(y, np.hstack([rest, inputs.u1]), np.hstack([rest, inputs.u2]), p)
+    jacobians = at_rest.jacobian
+    strength = regularity(setup, jacobians).min(axis=-1, initial=1.0)
     # near by, the rates along a branch are those of a linkage that has the change point exactly
     known = {
-        index: in_time
-        for index, each in branch_rates.items()
-        if strength[index] < MIN_REGULARITY_FOR_RATES and (in_time := _rates_in_time(each, inputs, index)) is not None
+        row: in_time
+        for row, along in branch_rates.items()
+        if strength[row] < MIN_REGULARITY_FOR_RATES and (in_time := _rates_in_time(along, inputs, row)) is not None
     }
-    weak = ~strong
-    weak[list(known)] = False
-    strong[list(known)] = False
+    is_known = np.isin(np.arange(len(z)), list(known))
+    is_regular = (strength >= MIN_REGULARITY) & ~is_known
 
     def solved(residuals: Array, order: int) -> Array:
-        motion = np.full(z.shape, np.nan)
-        if strong.any():
-            motion[strong] = -solve_vectors(rest.jacobian[strong], residuals[strong])
-        for index, each in known.items():
-            jacobian, guess = rest.jacobian[index], each[order - 1]
-            motion[index] = guess - truncated_step(
-                jacobian, residuals[index] + jacobian @ guess, z.shape[1] - branch_rates[index].rank_loss
-            )
-        return motion
+        rates = np.full(z.shape, np.nan)
+        if is_regular.any():
+            rates[is_regular] = -solve_vectors(jacobians[is_regular], residuals[is_regular])
+        for row, in_time in known.items():
+            guess, rank = in_time[order - 1], z.shape[1] - branch_rates[row].rank_loss
+            rates[row] = guess - truncated_step(jacobians[row], residuals[row] + jacobians[row] @ guess, rank)
+        return rates
 
-    z1 = solved(rest.F1, 1)
-    y1 = whole(z1, inputs.u1)
-    z2 = solved(program.kinematics(y, y1, whole(none, inputs.u2), p).F2, 2)
-    y2 = whole(z2, inputs.u2)
-    motion = program.kinematics(y, y1, y2, p)
-    parts, sure = [motion.w, motion.w1, motion.w2], np.flatnonzero(strong)
+    y1 = np.hstack([solved(at_rest.F1, 1), inputs.u1])
+    z2 = solved(functions.kinematics(y, y1, np.hstack([rest, inputs.u2]), p).F2, 2)
+    y2 = np.hstack([z2, inputs.u2])
+    motion = functions.kinematics(y, y1, y2, p)
+    parts = [motion.w, motion.w1, motion.w2]
     if with_jerk:
-        z3 = solved(program.third_residual_rates((y, y1, y2, whole(none, inputs.u3)), p), 3)
-        parts.append(program.third_coordinate_rates((y, y1, y2, whole(z3, inputs.u3)), p))
+        z3 = solved(functions.third_residual_rates((y, y1, y2, np.hstack([rest, inputs.u3])), p), 3)
+        parts.append(functions.third_coordinate_rates((y, y1, y2, np.hstack([z3, inputs.u3])), p))
     for part in parts[1:]:
-        part[weak] = np.nan
-    found_doubts = (
-        find_accuracy_doubts(setup, rest.jacobian[sure], motion.w[sure], y[sure], y1[sure], y2[sure])
-        if sure.size
-        else None
-    )
-    return SampleRates(parts, found_doubts and found_doubts._replace(rows=sure[found_doubts.rows]))
+        part[~(is_regular | is_known)] = np.nan
+    rows = np.flatnonzero(is_regular)
+    if not rows.size:
+        return SampleRates(parts, None)
+    doubts = find_accuracy_doubts(setup, jacobians[rows], motion.w[rows], y[rows], y1[rows], y2[rows])
+    return SampleRates(parts, doubts and doubts._replace(rows=rows[doubts.rows]))
 
 
 def _rates_in_time(branch_rates: BranchRates, inputs: InputRates, index: int) -> Array | None:
