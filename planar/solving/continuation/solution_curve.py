@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from math import perm
 from typing import NamedTuple
 
 import numpy as np
@@ -358,11 +359,8 @@ class Arc(NamedTuple):
     def polynomial(self, x: float, order: int = 0) -> Array:
         """The polynomial, or a derivative of it (n + 1,), so far along the axis."""
         shape = self.coefficients
-        if not order:
-            return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
-        powers = np.arange(len(shape))
         for _ in range(order):
-            shape, powers = shape[1:] * powers[1 : len(shape), None] / self.unit_length, powers[: len(shape) - 1]
+            shape = shape[1:] * np.arange(1, len(shape))[:, None] / self.unit_length
         return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
 
     def input_position(self, x: float) -> float:
@@ -417,10 +415,6 @@ def fit_polynomial(
 @cache
 def _hermite_matrix(places: tuple[float, ...]) -> Array:
     """Values, first and second derivatives of the powers at the places (3 places, powers)."""
-    degree = 3 * len(places)
-    rows = []
-    for x in places:
-        for order in range(3):
-            factors = [np.prod([k - j for j in range(order)]) if k >= order else 0.0 for k in range(degree)]
-            rows.append([f * x ** max(k - order, 0) for k, f in enumerate(factors)])
+    powers = range(3 * len(places))
+    rows = [[perm(k, order) * x ** max(k - order, 0) for k in powers] for x in places for order in range(3)]
     return np.array(rows, dtype=float)
