@@ -126,19 +126,13 @@ def follow_straight(solver: PreparedMechanism, z: Array, start: Array, stop: Arr
 
     Smoothly through change points. Raises NoAnswer where a dead point is on the way, or the branch cannot be followed.
     """
-    direction, inputs = stop - start, resting_inputs(np.stack([start, stop]))
-    distance = float(np.max(np.abs(direction), initial=0.0))
-    if distance == 0.0:
+    inputs = resting_inputs(np.stack([start, stop]))
+    if np.array_equal(start, stop):
         return unjudged_rows(solver, np.stack([z, z]), inputs)
-    follower = PathFollower(solver, z, start, direction)
-    end = follower.unknowns_at(distance)
-    if end is None:
-        raise follower.end_refusal
-    return unjudged_rows(solver, np.stack([z, end[0]]), inputs)._replace(
-        branch_rates={} if end[1] is None else {1: end[1]},
-        passed=follower.bifurcations_until(distance),
-        nearby=tuple(follower.tracker.nearby),
-    )
+    run = _SamplesFollower(solver, z, inputs).follow(is_quick=False)
+    if run.stopped is not None:
+        raise run.stopped
+    return run
 
 
 def follow_samples(
@@ -154,16 +148,21 @@ def follow_samples(
     one that does not the general path goes on until the quick one can take over again. What the general path does is
     counted in `budget`.
     """
-    return _SamplesFollower(solver, z, inputs, branches, budget or ArcBudget()).follow()
+    return _SamplesFollower(solver, z, inputs, branches, budget).follow()
 
 
 class _SamplesFollower:
     """A run that is followed: what is known of its samples, and the general path where it is needed."""
 
     def __init__(
-        self, solver: PreparedMechanism, z: Array, inputs: InputRates, branches: Sequence[int], budget: ArcBudget
+        self,
+        solver: PreparedMechanism,
+        z: Array,
+        inputs: InputRates,
+        branches: Sequence[int] = (),
+        budget: ArcBudget | None = None,
     ):
-        self.solver, self.branches, self.budget = solver, branches, budget
+        self.solver, self.branches, self.budget = solver, branches, budget or ArcBudget()
         self.run = unjudged_rows(solver, np.empty((len(inputs.u), z.size)), inputs)
         self.z, self.u = self.run.z, inputs.u
         self.z[0] = z
@@ -176,13 +175,14 @@ class _SamplesFollower:
         "those of the next samples on the follower's path, each with the one after it"
         self._passed_before = 0
 
-    def follow(self) -> RunSamples:
-        """All samples, as far as the motion comes."""
+    def follow(self, is_quick: bool = True) -> RunSamples:
+        """All samples, as far as the motion comes; by the general path alone where `is_quick` is not set."""
         samples = window = len(self.u)
         done, stopped = 1, None
         while done < samples and stopped is None:
             first, last = done, min(done + window, samples)
-            done = self._follow_quickly(slice(done - 1, last))
+            if is_quick:
+                done = self._follow_quickly(slice(done - 1, last))
             # of what comes after a sample that did not pass no more is tried than has passed before
             window = max(MIN_WINDOW, 2 * (done - first))
             if done > first:
