@@ -49,7 +49,7 @@ def cycle(
     and acceleration of the input that runs, as the chapters do; it is no run in time.
 
     `there_and_back` runs the range and comes back by the same positions, with the velocity turned round. `circuit` goes
-    through dead points all round the closed curve of positions back to the start; `steps` then divide its longest
+    through dead points along the closed curve of positions back to the start; `steps` then divide its longest
     stretch between dead points (a turn, if that is longer), and each stretch is divided about as finely.
 
     Where branches of the motion cross, it goes on smoothly; `branches` are the numbers of the ways taken at the first,

@@ -2,7 +2,7 @@
 
 The positions of a grid lie on the assembly to which the motion from the mechanism's own leads. From one position that
 is known lines of the grid are followed both ways, and from these the lines beside them, until no more can be reached:
-every step is followed, and none is assembled anew.
+every step is followed, and none is assembled again.
 """
 
 from __future__ import annotations

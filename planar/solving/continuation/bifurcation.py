@@ -25,9 +25,9 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
 ALIKE_RATIO = 30.0
-"""Singular values are small alike that are no more than so many times the least."""
+"""Singular values are small alike up to this multiple of the least."""
 MOST_ALIKE_VALUES = 64
-"""Beyond so many, as in a long row, it is not looked for where all vanish."""
+"""Beyond this number, as in a long row, a point where all vanish is not looked for."""
 MORE_VALUES = 2
 """Singular values that are looked at, beside those which are brought to zero."""
 LEAST_VALUES = 8
@@ -53,7 +53,7 @@ EXACT_FORM_TOLERANCE = 1e-10
 SAME_DIRECTION_TOLERANCE = 1e-6
 """Directions that are nearer to one another are one."""
 MAX_NULL_VECTORS = 6
-"""Of k null vectors there are up to 2^(k - 1) directions: of more than so many they are not looked for."""
+"""Of k null vectors there are up to 2^(k - 1) directions: of more than these they are not looked for."""
 STARTS_PER_DIRECTION, MAX_DIRECTION_STEPS = 24, 40
 """Complex directions from which Newton's method starts, for each that there may be, and its steps."""
 SETTLED_DIRECTION = 1e-9
@@ -129,12 +129,12 @@ class _Decomposition(NamedTuple):
         return self.right[int(np.sum(self.values > SINGULAR_TOLERANCE * self.greatest)) :].T
 
 
-def _decompose(curve: SolutionCurve, y: Array, least: int = LEAST_VALUES) -> _Decomposition:
-    """The constraints at y, with so many of the least singular values where unknowns are many."""
+def _decompose(curve: SolutionCurve, y: Array, count: int = LEAST_VALUES) -> _Decomposition:
+    """The constraints at y, with `count` of the least singular values where unknowns are many."""
     residual, jacobian = curve.residuals_and_jacobian(y)
     if isinstance(jacobian, SparseMatrices):
         try:
-            vectors = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(least)
+            vectors = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(count)
             return _Decomposition(residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
         except ValueError:
             jacobian = np.asarray(jacobian)
@@ -386,7 +386,7 @@ def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> 
     `tolerance` is how exactly the forms are known, as a part of the greatest. None where all vanish, or where two
     directions are one: branches that only touch are not parted by this order. Of two null vectors the directions are
     the roots of a polynomial. Of more Newton's method looks for all complex ones, of which there are 2^(k - 1) by
-    Bezout's theorem if no two are one: the real ones among so many are all.
+    Bezout's theorem if no two are one: the real ones among that number are all.
     """
     size = forms.shape[1]
     if size == 2:

@@ -35,7 +35,7 @@ SAME_ASSEMBLY_TOLERANCE = 1e-6
 REMARKED_DISTANCE = 1e-2
 """rad or sizes: a change point of a neighbouring linkage that is farther away is not worth a word."""
 MAX_REMARKS = 12
-"""Change points that are told one by one."""
+"""Change points that are reported one by one."""
 
 
 def watched_outputs(setup: PreparedMechanism) -> tuple[Pair, ...]:
@@ -108,14 +108,14 @@ class LimitSearch:
         growths = [self._growth(located, period.growth) for located in once]
         for times in range(int((last + END_TOLERANCE) / period.length) + 1):
             for (limit, point, passed), growth in zip(once, growths, strict=True):
-                there = point._replace(y=point.y + times * period.growth)
-                if there.y[-1] > last + END_TOLERANCE:
+                repeated = point._replace(y=point.y + times * period.growth)
+                if repeated.y[-1] > last + END_TOLERANCE:
                     continue
                 remark = limit.told
                 if passed is not None:
-                    remark = change_point_remark(self.setup, passed._replace(u=self.curve.inputs(there.y)))
-                value = limit.value + times * growth
-                yield LocatedLimit(limit._replace(input=self._position(there), value=value, told=remark), there, passed)
+                    remark = change_point_remark(self.setup, passed._replace(u=self.curve.inputs(repeated.y)))
+                position, value = self._position(repeated), limit.value + times * growth
+                yield LocatedLimit(limit._replace(input=position, value=value, told=remark), repeated, passed)
 
     def _growth(self, located: LocatedLimit, growth: Array) -> float:
         """By how much the value of a limit grows with each period: an output may turn with the input."""
@@ -145,7 +145,7 @@ class LimitSearch:
     def along(
         self, pieces: Iterable[PathPiece], last: float = np.inf, begin: CurvePoint | None = None
     ) -> Iterator[LocatedLimit]:
-        """What the walk meets on pieces of its curve, up to a place of the input or all round a circuit; `begin` is
+        """What the walk meets on pieces of its curve, up to a place of the input or along a circuit; `begin` is
         where they begin, if that may be a dead point."""
         curve, passed_count = self.curve, 0
         if begin is not None and begin.is_dead_point:
@@ -220,12 +220,12 @@ class LimitSearch:
         elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
             # both ends go one way, but the output may have gone back in between
             length, up = abs(piece.last - piece.first), float(np.sign(g0))
-            least, part = lowest_on_cubic((up * g0, up * s0 * length), (up * g1, up * s1 * length))
+            lowest, part = lowest_on_cubic((up * g0, up * s0 * length), (up * g1, up * s1 * length))
             middle = piece.first + sense * part * length
-            turned = rate_and_slope(middle)[0] if least < 0.0 else 0.0
-            if up * turned < -standing:
-                yield find_root_by_slope(rate_and_slope, (piece.first, middle), (g0, turned))
-                yield find_root_by_slope(rate_and_slope, (middle, piece.last), (turned, g1))
+            rate_at_middle = rate_and_slope(middle)[0] if lowest < 0.0 else 0.0
+            if up * rate_at_middle < -standing:
+                yield find_root_by_slope(rate_and_slope, (piece.first, middle), (g0, rate_at_middle))
+                yield find_root_by_slope(rate_and_slope, (middle, piece.last), (rate_at_middle, g1))
 
 
 class _PieceEnd(NamedTuple):
@@ -236,7 +236,7 @@ class _PieceEnd(NamedTuple):
 
 
 def distinct_limits(pair: str, curve: SolutionCurve, limits: Iterable[LocatedLimit]) -> tuple[Limit, ...]:
-    """Limits in their order, each once, with the two ends of every slide on the frame told apart."""
+    """Limits in their order, each once, with the two ends of every slide on the frame by name."""
     once: list[LocatedLimit] = []
     for located in limits:
         if not any(_is_same_limit(other, located) for other in once[-8:]):
@@ -256,7 +256,7 @@ def _is_same_limit(one: LocatedLimit, other: LocatedLimit) -> bool:
 
 
 def _name_stroke_ends(curve: SolutionCurve, pair: str, limits: list[LocatedLimit]) -> Iterator[Limit]:
-    """The limits, with the two ends of every slide told apart by how far they are from the driving crank's pin."""
+    """The limits; the two ends of every slide are named by how far they are from the driving crank's pin."""
     setup, driving = curve.solver, curve.solver.relative_motions[pair]
     frame, rounding = setup.mechanism.frame, SAME_VALUE_TOLERANCE * setup.unit
     pins = [pin for pin in driving.coincident_points() if pin[0] == frame and driving.input_kind is MeasureKind.ANGLE]
@@ -321,10 +321,10 @@ def change_point_remark(setup: PreparedMechanism, passed: PassedBifurcation) -> 
     place = join_all_names([setup.describe_input(driven.pair, u) for driven, u, part in moving if part])
     if branch_count == 1 and is_complete:
         return f"at {place} there is one more motion to first order, but only this one goes on"
-    asked = "the last that there is" if passed.beyond else "as asked for"
+    reason = "the last that there is" if passed.beyond else "as asked for"
     if passed.is_start:
-        choice = f"this motion starts there by number {passed.branch_index + 1}, {asked}"
+        choice = f"this motion starts there by number {passed.branch_index + 1}, {reason}"
     else:
-        choice = "this one goes on smoothly" if passed.branch_index == 0 else f"another one was taken, {asked}"
+        choice = "this one goes on smoothly" if passed.branch_index == 0 else f"another one was taken, {reason}"
     count = count_phrase(max(branch_count, 2), "branch", "branches")
     return f"at {place} {'' if is_complete else 'at least '}{count} of the motion cross; {choice}"

@@ -62,8 +62,8 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
     if setup.acceptance is None:
         return None
     s = setup.inputs
-    parts, judged = setup.acceptance.position(z, InputSamples(s.u, s.u1, s.u2), setup.acceptance_scales)
-    return FastPosition(parts, judged.residual) if _is_sure(judged, setup.tolerance) else None
+    parts, result = setup.acceptance.position(z, InputSamples(s.u, s.u1, s.u2), setup.acceptance_scales)
+    return FastPosition(parts, result.residual) if _is_sure(result, setup.tolerance) else None
 
 
 def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
@@ -71,8 +71,8 @@ def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
     if setup.acceptance is None:
         return False
     u, rest = setup.inputs.u, np.zeros_like(setup.inputs.u)
-    judged = setup.acceptance.position(z, InputSamples(u, rest, rest), setup.acceptance_scales)[1]
-    return judged.regularity >= MIN_FAST_REGULARITY
+    result = setup.acceptance.position(z, InputSamples(u, rest, rest), setup.acceptance_scales)[1]
+    return result.regularity >= MIN_FAST_REGULARITY
 
 
 @np.errstate(all="ignore")  # of what is not finite, at a dead point and for a step to the same place
@@ -85,20 +85,20 @@ def fast_run(setup: PreparedMechanism, z: Array, inputs: InputRates, start: int 
     path, steps = _straight_path(u), np.diff(u, axis=0)
     along = None if path is None else _along(path.axis, u1, u2)
     if path is not None and along is not None:
-        z, judged, accepted = _run_along(setup, z, u, path, SINGULAR_DISTANCE_RATIO, start)
-        w, w1, w2 = judged.coordinate_rates.transpose(1, 0, 2)
+        z, samples, accepted = _run_along(setup, z, u, path, SINGULAR_DISTANCE_RATIO, start)
+        w, w1, w2 = samples.coordinate_rates.transpose(1, 0, 2)
         first, second = along
         coordinate_rates = np.stack([w, w1 * first, w2 * first * first + w1 * second], axis=1)
     else:
         scales = setup.acceptance_scales
-        z, judged = functions.run(z, InputSamples(u, u1, u2), scales, start)
-        coordinate_rates = judged.coordinate_rates
-        accepted = _is_closed(judged.result, setup.tolerance)
+        z, samples = functions.run(z, InputSamples(u, u1, u2), scales, start)
+        coordinate_rates = samples.coordinate_rates
+        accepted = _is_closed(samples.result, setup.tolerance)
         before = step_ends(functions, z[:-1], u[:-1], steps, scales)
         after = step_ends(functions, z[1:], u[1:], steps, scales)
         squares = np.sum(steps * steps, axis=1)
         accepted[1:] &= keep_branch(np.diff(z, axis=0), before, after, squares, functions.block_starts)
-    is_sure = _is_sure(judged.result, setup.tolerance)
+    is_sure = _is_sure(samples.result, setup.tolerance)
     if setup.stops is not None:
         from planar.solving.stops import MAX_SURE_MOVE  # few mechanisms have stops
 
@@ -107,7 +107,7 @@ def fast_run(setup: PreparedMechanism, z: Array, inputs: InputRates, start: int 
     count = _count_first(accepted)
     if start and count < len(u):
         return None
-    residual = float(judged.result.residual[:count].max(initial=0.0))
+    residual = float(samples.result.residual[:count].max(initial=0.0))
     return RunSamples(z[:count], inputs.select(slice(count)), coordinate_rates[:count], is_sure[:count], residual)
 
 
@@ -122,11 +122,11 @@ def _run_along(
     functions, (axis, steps) = setup.acceptance, path
     assert functions is not None
     inputs = InputSamples(u, np.broadcast_to(axis, u.shape), np.zeros_like(u))
-    z, judged = functions.run(z, inputs, setup.acceptance_scales, start)
-    ends = _ends(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances, steps[:, None])
-    accepted, squares = _is_closed(judged.result, setup.tolerance), steps * steps * (axis @ axis)
+    z, samples = functions.run(z, inputs, setup.acceptance_scales, start)
+    ends = _ends(samples.coordinate_rates[:, 1, functions.unknown_columns], samples.distances, steps[:, None])
+    accepted, squares = _is_closed(samples.result, setup.tolerance), steps * steps * (axis @ axis)
     accepted[1:] &= keep_branch(np.diff(z, axis=0), *ends, squares, functions.block_starts, ratio)
-    return z, judged, accepted
+    return z, samples, accepted
 
 
 def _count_first(accepted: BoolArray) -> int:
@@ -303,11 +303,11 @@ class StraightPathCache:
         assert functions is not None
         u = np.array(self.start) + places[:, None] * axis
         path = _StraightPath(axis, np.diff(places))
-        samples, judged, accepted = _run_along(self.setup, z, u, path, MIN_SINGULAR_DISTANCE_RATIO)
-        accepted &= judged.result.least_singular_value > MIN_SINGULAR_VALUE
+        samples, judgement, accepted = _run_along(self.setup, z, u, path, MIN_SINGULAR_DISTANCE_RATIO)
+        accepted &= judgement.result.least_singular_value > MIN_SINGULAR_VALUE
         count = _count_first(accepted)
-        rates = judged.coordinate_rates[:, 1, functions.unknown_columns]
-        parts = samples[:count], rates, judged.distances, judged.coordinate_rates[:, 0]
+        rates = judgement.coordinate_rates[:, 1, functions.unknown_columns]
+        parts = samples[:count], rates, judgement.distances, judgement.coordinate_rates[:, 0]
         positions = [_KeptPosition(*of_position) for of_position in zip(*parts, strict=False)]
         return [*positions, *[None] * (len(samples) - count)]
 
@@ -323,13 +323,13 @@ def _step_formula(functions: AcceptanceFunctions) -> FormulaFunction:
     instructions, (signs, z, rates, regular, axis, p, row_scale, floor, along, u) = recorded_arguments(counts)
     distance, first, second = np.split(along, 3)
     step = functions.record_step(signs, z, InputSamples(u, axis, np.zeros_like(axis)), Scales(p, row_scale, floor))
-    judged = step.judged
-    w, w1, w2 = judged.coordinate_rates[0]
-    both = np.stack([rates, w1[functions.unknown_columns]]), np.stack([regular, judged.distances[0]])
+    judgement = step.judged
+    w, w1, w2 = judgement.coordinate_rates[0]
+    both = np.stack([rates, w1[functions.unknown_columns]]), np.stack([regular, judgement.distances[0]])
     ends = _ends(*both, np.array([distance]))
     squares = distance * distance * np.sum(axis * axis, keepdims=True)
     keeps = keep_branch((step.z - z)[None], *ends, squares, functions.block_starts, MIN_SINGULAR_DISTANCE_RATIO)
-    results = [*keeps, *greatest_entries(np.abs(step.moves)[:, None]), *(values[0] for values in judged.result)]
+    results = [*keeps, *greatest_entries(np.abs(step.moves)[:, None]), *(values[0] for values in judgement.result)]
     results += [*w, *(w1 * first), *(w2 * first * first + w1 * second)]
     formula = formula_of_results(instructions, [number_of(result, instructions) for result in results])
     return FormulaFunction(formula, counts, ((1, len(results)),))

@@ -152,9 +152,9 @@ def _find_turning_point(
         s0, s1, length = sense * before.curvature[-1], sense * arc.after.curvature[-1], abs(last - first)
         if s0 >= 0.0 or s1 <= 0.0:
             return None
-        least, part = lowest_on_cubic((g0, s0 * length), (g1, s1 * length))
+        lowest, part = lowest_on_cubic((g0, s0 * length), (g1, s1 * length))
         x = first + part * (last - first)
-        if least > 0.0 or sense * arc.point_at(curve, x).input_rate > 0.0:
+        if lowest > 0.0 or sense * arc.point_at(curve, x).input_rate > 0.0:
             return None
         last = x
     x = find_root(lambda x: sense * arc.point_at(curve, x).input_rate if x != first else g0, first, last)

@@ -42,9 +42,9 @@ FIRST_TURN_RATIO, FIRST_DISTANCE_RATIO = 0.8, 1.2
 MAX_CORRECTED_RATIO, STEP_GROWTH = 2.0, 1.6
 """How many times longer than its step a move may be, and a next step than one that was taken."""
 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
-"""Where to look for a change point: so near to a singular Jacobian, and again where it is so many times nearer."""
+"""Where to look for a change point: so near to a singular Jacobian, and again where it is nearer by this factor."""
 MAX_AHEAD_RATIO = 10.0
-"""A change point farther ahead than so many times the distance within which there is none is another one."""
+"""A change point farther ahead than this multiple of the distance within which there is none is another one."""
 MAX_ARCS = 5_000
 """Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
 NEAR_SLIDE_EXTENT = 4.0
@@ -93,10 +93,10 @@ class NearbyBifurcation(NamedTuple):
 
 
 class ArcBudget:
-    """What may be spent on one answer, counted in arcs, and who is told of each: where the inputs are."""
+    """What may be spent on one answer, counted in arcs, each of which is reported with the inputs there."""
 
-    def __init__(self, most: int = MAX_ARCS, tell: Callable[[Array], None] | None = None):
-        self.arcs_left, self._report = most, tell
+    def __init__(self, arcs: int = MAX_ARCS, tell: Callable[[Array], None] | None = None):
+        self.arcs_left, self._report = arcs, tell
 
     def spend(self, u: Array) -> bool:
         """Count an arc from inputs u (inputs,); False where nothing is left to spend, or the time is over."""
@@ -190,7 +190,7 @@ class CurveTracker:
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
-        shown = SHOWN_SLIDE_EXTENT * max(1.0, greatest_size(self.curve.p))
+        shown_extent = SHOWN_SLIDE_EXTENT * max(1.0, greatest_size(self.curve.p))
         farthest = max(MAX_SLIDE_EXTENT, 2.0 * self._slide_extent(self.point.y))
         if self._start_arc is not None:
             self.point = self._start_arc.after
@@ -229,10 +229,10 @@ class CurveTracker:
             self._update_nearby(after)
             self._approaching = after.regular_distance < point.regular_distance
             arc = arc_between(point, after)
-            if self.far_point is None and self._slide_extent(after.y) > shown:
+            if self.far_point is None and self._slide_extent(after.y) > shown_extent:
 
                 def beyond(x: float, arc: Arc = arc) -> float:
-                    return self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown
+                    return self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown_extent
 
                 self.far_point = arc.point_at(self.curve, find_root(beyond, *arc.ends))
             self.point = after

@@ -113,9 +113,9 @@ class ImplicitCurve:
             if point is not None:
                 return point
             jacobian = np.asarray(jacobian)
-        least = self._least_singular_value(jacobian)
+        least_value = self._least_singular_value(jacobian)
         n = len(y) - 1
-        if len(jacobian) == n and least > REGULAR_SINGULAR_VALUE:
+        if len(jacobian) == n and least_value > REGULAR_SINGULAR_VALUE:
             system = stack_row(jacobian, towards)
             tangent = _solve_regular(system, input_axis(n + 1))
             size = np.inf if tangent is None else length_of(tangent)
@@ -123,14 +123,14 @@ class ImplicitCurve:
                 tangent /= size
                 system[n] = tangent
                 curvature = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
-                distance = self._regular_distance(y, tangent, jacobian, least) if with_distance else np.nan
+                distance = self._regular_distance(y, tangent, jacobian, least_value) if with_distance else np.nan
                 return CurvePoint(y, tangent, curvature, distance)
         u, s, vt = np.linalg.svd(jacobian)
         tangent = vt[n] if vt[n] @ towards >= 0.0 else -vt[n]
         is_nonzero = s[:n] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if n else np.zeros(0, dtype=bool)
         along = (u.T[:n] @ self.second_derivative(y, tangent)) if n else np.zeros(0)
         curvature = -vt[:n].T @ np.where(is_nonzero, along / np.where(is_nonzero, s[:n], 1.0), 0.0)
-        return CurvePoint(y, tangent, curvature, self._regular_distance(y, tangent, jacobian, least))
+        return CurvePoint(y, tangent, curvature, self._regular_distance(y, tangent, jacobian, least_value))
 
     def _sparse_point_at(
         self, y: Array, towards: Array, jacobian: SparseMatrices, with_distance: bool
@@ -141,15 +141,15 @@ class ImplicitCurve:
         except ValueError:
             return None
         sizes = jacobian.column_norms(MIN_COLUMN_NORM)
-        least = bordered.least_singular_value(sizes)
-        if not (least > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
+        least_value = bordered.least_singular_value(sizes)
+        if not (least_value > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
             return None
         tangent = bordered.tangent
         curvature = bordered.step(-self.second_derivative(y, tangent), tangent)
-        distance = self._sparse_regular_distance(y, bordered, sizes, least) if with_distance else np.nan
+        distance = self._sparse_regular_distance(y, bordered, sizes, least_value) if with_distance else np.nan
         return CurvePoint(y, tangent, curvature, distance)
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least_value: float) -> float:
         """The same as `_regular_distance`."""
         return np.inf
 
@@ -160,7 +160,7 @@ class ImplicitCurve:
             return 1.0
         return float(np.linalg.svd(jacobian / column_norms(jacobian, MIN_COLUMN_NORM), compute_uv=False)[n - 1])
 
-    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least_value: float) -> float:
         """How far along the curve J is known to keep its rank: not asked of a curve that may cross others."""
         return np.inf
 
@@ -239,7 +239,7 @@ class SolutionCurve(ImplicitCurve):
         """Whether a point passes the residual check."""
         return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance
 
-    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least_value: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
 
         Constraints that nearly depend on one another all along keep J near a singular one, but do not bring it nearer.
@@ -251,18 +251,18 @@ class SolutionCurve(ImplicitCurve):
             return np.inf
         sizes = column_norms(jacobian, MIN_COLUMN_NORM)
         change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - jacobian) / (sizes * DIFFERENCE_STEP)
-        distance = float(singular_distance(least, np.linalg.norm(change)))
-        if distance >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
+        distance = float(singular_distance(least_value, np.linalg.norm(change)))
+        if distance >= SHORT_REGULAR_DISTANCE or least_value < ZERO_SINGULAR_VALUE:
             return distance
         relative = np.linalg.lstsq(jacobian / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
         return max(distance, 1.0 / max(float(np.linalg.norm(relative)), 1e-300))
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least_value: float) -> float:
         jacobian, tangent = bordered.jacobian, bordered.tangent
         ahead = self.jacobian(y + DIFFERENCE_STEP * tangent)
         assert isinstance(ahead, SparseMatrices)
         change = SparseMatrices(jacobian.pattern, (ahead.values - jacobian.values) / DIFFERENCE_STEP)
-        distance = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
+        distance = float(singular_distance(least_value, np.asarray(length_of(change.divide_columns(sizes).values))))
         if distance >= SHORT_REGULAR_DISTANCE:
             return distance
         return max(distance, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
@@ -321,8 +321,9 @@ def pair_motions_at(pairs: Sequence[Pair], curve: SolutionCurve, point: CurvePoi
     columns = [setup.column[name] for name in names if name in setup.column]
     parts = np.stack([motion.w, motion.w1, motion.w2], axis=1)[columns] * setup.scale[columns, None]
     jets = {column: Jet(*rates) for column, rates in zip(columns, parts.tolist(), strict=True)}
-    frames, own = frames_from_coordinates(jets, setup.column, bodies, joined)
-    return np.array([value_and_rates(pair.input_position_at(setup.shapes, frames, own)) for pair in pairs], dtype=float)
+    frames, coordinates = frames_from_coordinates(jets, setup.column, bodies, joined)
+    motions = [value_and_rates(pair.input_position_at(setup.shapes, frames, coordinates)) for pair in pairs]
+    return np.array(motions, dtype=float)
 
 
 class Arc(NamedTuple):

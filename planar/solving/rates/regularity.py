@@ -78,8 +78,8 @@ def _least_singular_value(block_jacobian: Array) -> Array:
 def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
     """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
 
-    The size of an unknown's column is that in its own block, whatever large or small things later blocks hang on it.
-    A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
+    The size of an unknown's column is that in its own block, however large or small the things that hang on it are. A
+    column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     jacobian = np.asarray(jacobian)
     scaled = jacobian / setup.row_scale[:, None]
@@ -103,7 +103,7 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
     for seed in range(3):
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, u.size)
-        moved = correct_blocks(
+        beside = correct_blocks(
             setup.functions,
             p,
             z + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, z.size),
@@ -111,8 +111,8 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
             stage.block_index,
         )
         if (
-            moved is not None
-            and regularity(setup, jacobian_at(setup, moved, near))[stage.block_index] > ZERO_REGULARITY
+            beside is not None
+            and regularity(setup, jacobian_at(setup, beside, near))[stage.block_index] > ZERO_REGULARITY
         ):
             return False
     return True
@@ -133,10 +133,10 @@ def links_free_at_rest(setup: PreparedMechanism, jacobian: Array | SparseMatrice
 def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
     """The links that rates of the unknowns (unknowns,) move."""
     share = np.abs(rates)
-    moved = [
+    owners = [
         setup.equations.coordinates[column].owner
         for column, part in zip(setup.equations.unknowns, share, strict=True)
         if part > 1e-3 * share.max()
     ]
-    joined = [link for name in moved for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
+    joined = [link for name in owners for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
     return [link for link in dict.fromkeys(joined) if link != setup.mechanism.frame]

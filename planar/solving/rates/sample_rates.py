@@ -185,8 +185,8 @@ def _error_amplification(setup: PreparedMechanism, jacobian: Array) -> tuple[Arr
         block_jacobian = jacobian[:, stage.rows, stage.unknowns]
         if block_jacobian.shape[-1]:
             arms[:, stage.unknowns] = np.linalg.norm(block_jacobian, axis=1)
-            least = arms[:, stage.unknowns].min(axis=1)
-            amplification = 1.0 / np.maximum(least * strong[:, index] ** 2, SMALLEST_NORMAL)
+            shortest_arm = arms[:, stage.unknowns].min(axis=1)
+            amplification = 1.0 / np.maximum(shortest_arm * strong[:, index] ** 2, SMALLEST_NORMAL)
             which = np.where(amplification > greatest, index, which)
             greatest = np.maximum(greatest, amplification)
     return greatest, which, arms
@@ -234,7 +234,7 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
 
     inputs = np.abs(y[:, unknowns:])
     dy = solved(np.abs(terms.value[:, :rows]) + EPS * terms.term_sum[:, :rows], EPS * inputs)
-    at = _matrix_times_vector(slope[:, rows:], dy) + EPS * terms.term_sum[:, rows:]
+    position_errors = _matrix_times_vector(slope[:, rows:], dy) + EPS * terms.term_sum[:, rows:]
     lost1 = _matrix_times_vector(first, dy) + EPS * _matrix_times_vector(slope, np.abs(y1))
     dy1 = solved(lost1[:, :rows], EPS * np.abs(y1[:, unknowns:]))
     lost2 = (
@@ -244,7 +244,8 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
     )
     dy2 = solved(lost2[:, :rows], EPS * np.abs(y2[:, unknowns:]))
     one, two = _reference_rates(setup, slope[:, :rows], np.abs(y1), np.abs(y2))
-    return RateErrors(_row_maxima(at), _row_maxima(_relative_errors(dy1, one)), _row_maxima(_relative_errors(dy2, two)))
+    errors = position_errors, _relative_errors(dy1, one), _relative_errors(dy2, two)
+    return RateErrors(*(np.max(error, axis=1, initial=0.0) for error in errors))
 
 
 def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
@@ -283,7 +284,3 @@ def _matrix_times_vector(matrices: Array, vectors: Array) -> Array:
 
 def _relative_errors(errors: Array, references: Array) -> Array:
     return np.where(errors > 0.0, errors / np.maximum(references, SMALLEST_NORMAL), 0.0)
-
-
-def _row_maxima(values: Array) -> Array:
-    return np.max(values, axis=1, initial=0.0)

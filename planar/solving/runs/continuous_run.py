@@ -162,12 +162,12 @@ class ContinuousRun:
             b[k], fb[k] = np.where(stays, b[k], a[k]), np.where(stays, fb[k], fa[k])
             a[k], fa[k] = x, f
             with np.errstate(invalid="ignore", divide="ignore"):
-                least = room / np.abs(b[k] - x)
+                shortest_part = room / np.abs(b[k] - x)
                 xi, phi = (x - b[k]) / (c - b[k]), (f - fb[k]) / (fc - fb[k])
                 inner = f / (fb[k] - f) * fc / (fb[k] - fc) + (c - x) / (b[k] - x) * f / (fc - f) * fb[k] / (fc - fb[k])
             is_smooth = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
-            part[k] = np.minimum(np.maximum(np.where(is_smooth, inner, 0.5), least), 1.0 - least)
-            is_open[k] = (f != 0.0) & (least <= 0.5)
+            part[k] = np.minimum(np.maximum(np.where(is_smooth, inner, 0.5), shortest_part), 1.0 - shortest_part)
+            is_open[k] = (f != 0.0) & (shortest_part <= 0.5)
         return np.where(np.abs(fa) < np.abs(fb), a, b)
 
     @property

@@ -106,7 +106,7 @@ class RangeRun:
         return inputs
 
     def arc_budget(self, reach: float, first: float | None = None) -> ArcBudget:
-        """What may be spent on so long a way of the input; who asked is told how far from `first` it has come."""
+        """What may be spent on so long a way of the input; reports how far from `first` it has come."""
         tell = None
         if self.progress is not None and first is not None:
             inform, total = self.progress, reach * self.scale

@@ -71,7 +71,7 @@ def build_motion(
     if find_limits is not None:
         course = RunCourse(run.z, frozenset(run.branch_rates), fork_positions, find_limits)
     names = [driven.pair for driven in solver.mechanism.inputs]
-    frames, own = lazy_frames(solver, parts[:3])
+    frames, coordinates = lazy_frames(solver, parts[:3])
     return Motion(
         mechanism=solver.mechanism,
         inputs=dict(zip(names, _input_motions(solver, run.inputs), strict=True)),
@@ -80,7 +80,7 @@ def build_motion(
         residual=residual,
         remarks=(*assembly_remarks, *change_point_remarks(solver, run.passed, run.nearby), *remarks),
         frames=frames,
-        own=own,
+        own=coordinates,
         shapes=solver.shapes,
         time=time,
         jerked=ThirdRates(*lazy_frames(solver, parts)) if with_jerk else None,
@@ -117,9 +117,9 @@ def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> CheckedRat
     w: Array = np.full((3, len(run.z), len(solver.scale)), np.nan)
     residual = 0.0
     for row, (z, *inputs) in enumerate(zip(run.z, *run.inputs[:3], strict=True)):
-        coordinate_rates, judged = solver.acceptance.position(z, InputSamples(*inputs), solver.acceptance_scales)
-        w[0, row], residual = coordinate_rates[0], max(residual, judged.residual)
-        if not (judged.residual <= solver.tolerance and judged.contact_gap <= CONTACT_TOLERANCE):
+        coordinate_rates, result = solver.acceptance.position(z, InputSamples(*inputs), solver.acceptance_scales)
+        w[0, row], residual = coordinate_rates[0], max(residual, result.residual)
+        if not (result.residual <= solver.tolerance and result.contact_gap <= CONTACT_TOLERANCE):
             return None
     return [*w], residual, ()
 
@@ -142,24 +142,24 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
         part[list(run.dead_points)] = np.nan
     if doubt is not None:
         remarks += _remove_inexact_rates(solver, inputs, parts, doubt, is_part)
-    frames, own = lazy_frames(solver, parts[:3])
+    frames, coordinates = lazy_frames(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
     jets = [Jet(*rates) for rates in _input_motions(solver, inputs)]
-    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, jets)
+    gaps_of_rates = solver.residual_check.rate_residuals(frames, coordinates, jets)
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
         of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
         wrong = of_rows > 1e3 * solver.tolerance
         if not wrong.any():
             continue
         row = int(np.argmax(of_rows))
-        at = f"at {solver.describe_inputs(inputs.u[row])}"
+        place = f"at {solver.describe_inputs(inputs.u[row])}"
         if wrong[determined].all() and not is_part:
-            raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
+            raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), place)
         for part in parts[1:]:
             part[wrong] = np.nan
-        remarks = (*remarks, f"{at} no rates are given: they would break pair {pair!r}, next to a change point")
+        remarks = (*remarks, f"{place} no rates are given: they would break pair {pair!r}, next to a change point")
         determined &= ~wrong
-    solver.refuse_open_contact(frames, own)
+    solver.refuse_open_contact(frames, coordinates)
     return parts, residual, remarks
 
 

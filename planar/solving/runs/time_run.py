@@ -90,9 +90,9 @@ class _TimeLimits:
             pair = solver.mechanism.inputs[int(np.flatnonzero(passed.input_direction)[0])].pair
             limits.append(Limit("change point", pair, time, time, None, change_point_remark(solver, passed)))
         for row in run.dead_points:
-            moved = int(np.argmax(np.abs(run.inputs.u[row] - run.inputs.u[row - 1])))
-            pair = solver.mechanism.inputs[moved].pair
-            position = float(run.inputs.u[row, moved]) * (solver.unit if solver.is_sliding(pair) else 1.0)
+            index = int(np.argmax(np.abs(run.inputs.u[row] - run.inputs.u[row - 1])))
+            pair = solver.mechanism.inputs[index].pair
+            position = float(run.inputs.u[row, index]) * (solver.unit if solver.is_sliding(pair) else 1.0)
             limits.append(Limit("input dead point", pair, float(self.time[row]), position))
         if run.outcome is Outcome.STOP:
             for stop in solver.stops_at(run.z[-1], run.inputs.u[-1]):
@@ -127,10 +127,10 @@ class _TimeLimits:
                 return _output_rates(motion, output)[1]
 
             of_rows = velocity(motion)
-            least = STANDING_RATE * max(float(np.nanmax(np.abs(of_rows), initial=0.0)), STANDING_RATE)
+            threshold = STANDING_RATE * max(float(np.nanmax(np.abs(of_rows), initial=0.0)), STANDING_RATE)
             brackets = [
                 (before, after)
-                for before, after in pairwise(np.flatnonzero(np.abs(of_rows) > least).tolist())
+                for before, after in pairwise(np.flatnonzero(np.abs(of_rows) > threshold).tolist())
                 # a rest in between is no end of a stroke at one time
                 if of_rows[before] * of_rows[after] <= 0.0
                 and after - before <= 2
