@@ -13,6 +13,7 @@ from planar.document.dimensions import change_dimension, link_lengths
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.continuation.path import follow_samples
+from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
 
 SYSTEM = "planar.sweep"
@@ -45,7 +46,14 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
 
     one, all_steps = np.arange(1), np.arange(steps + 1)
     return [
-        Entry("planar, a run with its checks", False, one, all_steps, lambda: follow_samples(solver, p, z, u).z, read),
+        Entry(
+            "planar, a run with its checks",
+            False,
+            one,
+            all_steps,
+            lambda: follow_samples(solver, z, resting_inputs(u)).z,
+            read,
+        ),
         *(_prepare(mechanism, swept, steps, rates) for rates in (False, True)),
         Entry(
             "planar.cycle, from the sketch",

@@ -10,7 +10,7 @@ import numpy as np
 import planar
 from benchmarks.synthesis.misses import Array
 from planar.foundation.jets import value_and_rates
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 
 LINK = "BC"
 GARAGE = [[0, 0, 90], [20, 70, 68], [60, 130, 32], [130, 150, 0]]

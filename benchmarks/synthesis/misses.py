@@ -12,7 +12,7 @@ import numpy as np
 
 import planar
 from planar.foundation.jets import TURN
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 
 Array = np.ndarray
 

@@ -13,6 +13,7 @@ from planar.equations.acceptance import InputSamples
 from planar.model.mechanism import Drive, replace_inputs
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_samples, follow_to
+from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver, solve
 
 
@@ -33,12 +34,12 @@ class Turn:
         z = np.empty((len(self.u), self.start.size))
         z[0] = self.start
         for index in range(1, len(self.u)):
-            z[index] = follow_to(self.solver, self.numbers, z[index - 1], self.u[index - 1], self.u[index])
+            z[index] = follow_to(self.solver, z[index - 1], self.u[index - 1], self.u[index])
         return z
 
     def gated(self) -> Array:
         """z by one call of the run's program, then both parts of the gate for all samples."""
-        return follow_samples(self.solver, self.numbers, self.start, self.u).z
+        return follow_samples(self.solver, self.start, resting_inputs(self.u)).z
 
     def bare(self) -> Array:
         """z block after block at all samples, with what is judged of them by one evaluation."""

@@ -16,6 +16,7 @@ from planar.model.mechanism import Drive, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_samples
+from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
 from planar.solving.runs.continuous_run import rows_with_rates, run_unknowns
 
@@ -76,7 +77,7 @@ class InterpolatedRun:
             there = self._solver_at(position)
             start = there.inputs.u.copy()
             start[self._running_index] = self.positions[index] / self._input_scale
-            way = follow_samples(there, there.inputs.p, self.z[index], np.stack([start, there.inputs.u]))
+            way = follow_samples(there, self.z[index], resting_inputs(np.stack([start, there.inputs.u])))
             if way.stopped is not None:
                 raise way.stopped
             z, local = way.z[-1], way.branch_rates.get(1)

@@ -33,7 +33,7 @@ from planar.foundation.time_limit import all_within_time
 from planar.model.mechanism import Mechanism
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 from planar.solving.position import solve, solved_mechanism
 
 MAX_CHUNK_NUMBERS = 2_000_000

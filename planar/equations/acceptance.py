@@ -55,7 +55,7 @@ class AcceptanceResult(NamedTuple, Generic[Judged]):
     least_singular_value: Judged
     "no more than the least singular value of any block, columns of one size"
     rounding_amplification: Judged
-    "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
+    "by how much, at most, round-off is greater in the rates, see `solving.rates.sample_rates`"
 
 
 RESULT_COUNT = len(AcceptanceResult._fields)

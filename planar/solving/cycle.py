@@ -16,11 +16,9 @@ from planar.model.run_arguments import check_number, check_steps
 from planar.model.wording import quote_names
 from planar.results.motion import Motion
 from planar.solving.position import SolvedMechanism, solved_mechanism
-from planar.solving.runs.range_run import RangeRun
-from planar.solving.runs.running_input import Progress
-from planar.solving.runs.time_run import TimeRun
+from planar.solving.runs.range_run import Progress, RangeRun
+from planar.solving.runs.time_run import run_in_time
 
-"""A run of so many positions of forty links takes some hundred megabytes."""
 MAX_DURATION = 1e6
 """s"""
 
@@ -51,7 +49,7 @@ def cycle(
     and acceleration of the input that runs, as the chapters do; it is no run in time.
 
     `there_and_back` runs the range and comes back by the same positions, with the velocity turned round. `circuit` goes
-    through dead points all round the closed curve of positions back to the start; `steps` then divide its longest
+    through dead points along the closed curve of positions back to the start; `steps` then divide its longest
     stretch between dead points (a turn, if that is longer), and each stretch is divided about as finely.
 
     Where branches of the motion cross, it goes on smoothly; `branches` are the numbers of the ways taken at the first,
@@ -81,12 +79,10 @@ def cycle(
     check_number("duration", duration, MAX_DURATION, "s")
     if duration is not None and not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
-    numbers = branches if isinstance(branches, Iterable) else [branches]
-    numbered = not any(isinstance(each, bool) or not isinstance(each, Integral) or each < 1 for each in numbers)
-    if not numbered or not isinstance(branches, Iterable):
+    if not isinstance(branches, Iterable) or not all(_is_count(number) for number in branches):
         raise BadInput("branches", f"a list of numbers of branches from 1 on is wanted, not {branches!r:.60}")
     ranged = (start is not None, stop is not None, pair is not None, there_and_back, circuit)
-    lawful = any(given.law is not None for given in mechanism.inputs)
+    lawful = any(driven.law is not None for driven in mechanism.inputs)
     is_timed = duration is not None or (lawful and not any(ranged))
     known, count = solved_mechanism(mechanism), len(mechanism.inputs)
     if not count or known.is_rigid or (count > 1 and pair is None and not is_timed):
@@ -94,7 +90,7 @@ def cycle(
     if is_timed:
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return _explained_run(known, pair, lambda: TimeRun(mechanism, branches, jerk).run(int(steps), duration))
+        return _explained_run(known, pair, lambda: run_in_time(mechanism, int(steps), duration, branches, jerk))
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
 
@@ -107,6 +103,11 @@ def cycle(
     return _explained_run(known, pair, run)
 
 
+def _is_count(number: object) -> bool:
+    """Whether an argument is a number from 1 on, and no truth value."""
+    return isinstance(number, Integral) and not isinstance(number, bool) and int(number) >= 1
+
+
 def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], Motion]) -> Motion:
     """A run; where no input can run from the position, `motion_refusal` says why.
 
@@ -116,8 +117,8 @@ def _explained_run(known: SolvedMechanism, pair: str | None, run: Callable[[], M
         motion = run()
     except NoAnswer as problem:
         raise known.motion_refusal(pair) or problem from None
-    positions = [given.position for given in motion.inputs.values()]
-    if any(each[0] != each[-1] or np.ptp(each) for each in positions):
+    positions = [driven.position for driven in motion.inputs.values()]
+    if any(np.ptp(position) for position in positions):
         return motion
     subject = "inputs" if len(positions) > 1 else "input"
     remark = f"nothing moves over the whole run, as the {subject} at {quote_names(list(motion.inputs))} "

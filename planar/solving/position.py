@@ -39,10 +39,9 @@ from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
-    from planar.solving.continuation.path_pieces import BranchRates
-    from planar.solving.continuation.singular_rates import SingularRates
+    from planar.solving.continuation.bifurcation import SingularRates
+    from planar.solving.continuation.run_samples import BranchRates, InputRates
     from planar.solving.continuation.solution_curve import CurvePoint
-    from planar.solving.rates.sample_rates import InputRates
 
 
 @takes_mechanism
@@ -86,10 +85,10 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 
     # in the lengths of the size here: without a link's length a farther input makes the size greater
     scale = np.where(here.structure.input_slides, there.unit / here.unit, 1.0)
-    way = follow_straight(here, here.inputs.p, found.z, here.inputs.u, there.inputs.u * scale)
+    way = follow_straight(here, found.z, here.inputs.u, there.inputs.u * scale)
     told = known.remarks
     if way.passed or way.nearby:
-        from planar.solving.continuation.change_point_remarks import change_point_remarks
+        from planar.solving.continuation.events import change_point_remarks
 
         told = (*told, *change_point_remarks(here, way.passed, way.nearby))
     by = (here.scale / there.scale)[list(here.equations.unknowns)]
@@ -253,7 +252,7 @@ class PositionSolver(PreparedMechanism):
                 return regular[0].state(regular[1], remarks)
             if not isinstance(problem, SingularPosition):
                 raise
-            from planar.solving.continuation.singular_rates import singular_rates  # few positions are of this kind
+            from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
 
             through = singular_rates(self, z)
             state = through and self._singular_state(through, remarks)
@@ -282,7 +281,7 @@ class PositionSolver(PreparedMechanism):
         return self.functions.kinematics(y, y1, y2, s.p)
 
     def _one_sample(self) -> InputRates:
-        from planar.solving.rates.sample_rates import InputRates
+        from planar.solving.continuation.run_samples import InputRates
 
         s = self.inputs
         return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])

@@ -26,7 +26,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     solver, z, remarks = known.solver, known.assembly.z, known.remarks
     if drives:
         there = solver.with_inputs_of(replace_inputs(mechanism, tuple(drives)))
-        z = follow_to(there, there.inputs.p, z, solver.inputs.u, there.inputs.u)
+        z = follow_to(there, z, solver.inputs.u, there.inputs.u)
         solver = there
     u, p = solver.inputs.u, solver.inputs.p
     gaps = solver.residuals(z[None], u[None])[:, 0]

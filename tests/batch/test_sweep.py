@@ -182,7 +182,7 @@ def test_a_flipped_linkage_is_closed_and_does_not_pass():
     solver, flipped = PositionSolver(mechanism), PositionSolver(four_bar(*ROCKER, 0.8, -1))
     z, other = (each.find_assembly().z for each in (solver, flipped))
     u = solver.inputs.u
-    near = planar.solving.continuation.path.follow_to(solver, solver.inputs.p, z, u, u + 0.02)
+    near = planar.solving.continuation.path.follow_to(solver, z, u, u + 0.02)
     accepted = [
         accept_steps(solver.acceptance, np.stack([z, after]), np.stack([u, u + 0.02]), solver.acceptance_scales)
         for after in (near, other)

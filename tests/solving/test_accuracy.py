@@ -14,7 +14,7 @@ from planar.foundation.jets import Jet
 from planar.model.pairs.base import sample_shape
 from planar.model.pairs.guide_line import LinkLine
 from planar.solving.continuation import path, predictor_corrector
-from planar.solving.continuation.period import Period
+from planar.solving.continuation.path_pieces import Period
 from planar.solving.position import PositionSolver
 from tests.builders import four_bar_document, slider_crank_document
 from tests.draws import draws, part
@@ -242,7 +242,7 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
     mechanism = planar.from_dict(sketched_four_bar(*lengths, 0.0, of_four_bar(*lengths, 0.0, 1)[0]))
     asked = []
     real = path.follow_samples
-    monkeypatch.setattr(path, "follow_samples", lambda *given: asked.append(len(given[3])) or real(*given))
+    monkeypatch.setattr(path, "follow_samples", lambda *given: asked.append(len(given[2].u)) or real(*given))
     for far in (1e5, -1e7):
         motion = planar.cycle(mechanism, 16, 0.0, far)
         rounding = 20.0 * np.finfo(float).eps * abs(far)
@@ -261,7 +261,7 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
 def test_turns_without_change_points_are_not_gone_through_one_by_one():
     period = Period((), np.array([0.0, 2.0 * np.pi]), (), ())
     with watched(20):
-        assert list(period.bifurcations_until(None, 1e15)) == []
+        assert list(period.bifurcations_until(1e15)) == []
 
 
 def test_a_far_motion_that_ends_or_does_not_come_back_says_so(monkeypatch):

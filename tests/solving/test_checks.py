@@ -7,7 +7,8 @@ from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving import position
 from planar.solving.checks.branch_check import is_move_allowed
-from planar.solving.continuation.path import follow_samples, follow_to
+from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
+from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
 from planar.solving.rates import sample_rates
 from tests.acceptance import spoil_runs
@@ -20,6 +21,14 @@ CRANK = four_bar_document(0.3, 0.9, 0.7, 1.0, 0.8, omega=2.0, alpha=1.0, sketch=
 @pytest.fixture
 def solver() -> PositionSolver:
     return PositionSolver(files.from_dict(CRANK))
+
+
+@pytest.fixture
+def by_general_path(monkeypatch) -> list[float]:
+    """The places of samples that the general path solves."""
+    places, real = [], PathFollower.unknowns_at
+    monkeypatch.setattr(PathFollower, "unknowns_at", lambda self, place: places.append(place) or real(self, place))
+    return places
 
 
 def mirrored(solver: PositionSolver, z: np.ndarray) -> np.ndarray:
@@ -44,7 +53,7 @@ def test_the_flipped_assembly_is_closed_too(solver):
 def test_a_step_to_the_flipped_assembly_is_refused_though_its_residual_is_zero(solver):
     z, u = solver.find_assembly().z, solver.inputs.u
     ahead = u + 0.01
-    on = follow_to(solver, solver.inputs.p, z, u, ahead)
+    on = follow_to(solver, z, u, ahead)
     off = mirrored(PositionSolver(files.from_dict(CRANK | {"inputs": [{"pair": "A", "position": 0.81}]})), on)
     inputs = np.array([u, ahead])
     for after, keeps in ((on, True), (off, False)):
@@ -56,18 +65,18 @@ def test_a_step_to_the_flipped_assembly_is_refused_though_its_residual_is_zero(s
 def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_branch(solver):
     """The second assembly is followed as well as the first, and passes: it is the way between them that does not."""
     inputs = circle(solver)
-    first = follow_samples(solver, solver.inputs.p, solver.find_assembly().z, inputs).z
-    second = follow_samples(solver, solver.inputs.p, mirrored(solver, first[0]), inputs).z
+    first = follow_samples(solver, solver.find_assembly().z, resting_inputs(inputs)).z
+    second = follow_samples(solver, mirrored(solver, first[0]), resting_inputs(inputs)).z
     for samples in (first, second):
         assert accept_steps(solver.acceptance, samples, inputs, solver.acceptance_scales).all()
     crossed = np.where(np.arange(len(inputs))[:, None] % 2, first, second)
     assert not accept_steps(solver.acceptance, crossed, inputs, solver.acceptance_scales).any()
 
 
-def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, monkeypatch):
+def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, by_general_path, monkeypatch):
     z, inputs = solver.find_assembly().z, circle(solver)
-    honest = follow_samples(solver, solver.inputs.p, z, inputs)
-    assert honest.general_count == 0
+    honest = follow_samples(solver, z, resting_inputs(inputs))
+    assert not by_general_path
 
     def flip(found, u):
         for k in range(len(u)):
@@ -76,8 +85,8 @@ def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, mon
                 found[k] = mirrored(PositionSolver(files.from_dict(other)), found[k])
 
     spoil_runs(solver, monkeypatch, flip)
-    fooled = follow_samples(solver, solver.inputs.p, z, inputs)
-    assert 4 <= fooled.general_count <= 6  # those that were flipped, and what lies on the same arc of the curve
+    fooled = follow_samples(solver, z, resting_inputs(inputs))
+    assert 4 <= len(by_general_path) <= 6  # those that were flipped, and what lies on the same arc of the curve
     turns = (fooled.z - honest.z) / (2 * np.pi)
     np.testing.assert_allclose(fooled.z, honest.z + 2 * np.pi * np.round(turns), atol=1e-12)
 
@@ -91,17 +100,17 @@ def test_a_finite_wrong_answer_from_the_program_does_not_get_out(solver, spoil):
     assert "'C'" in refused.value.reason or "'D'" in refused.value.reason or "'B'" in refused.value.reason
 
 
-def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, monkeypatch):
+def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, by_general_path, monkeypatch):
     z, inputs = solver.find_assembly().z, circle(solver)
-    honest = follow_samples(solver, solver.inputs.p, z, inputs)
+    honest = follow_samples(solver, z, resting_inputs(inputs))
 
     def spoil(found, u):
         found[u[:, 0] == inputs[50, 0], 0] += 1e-6
         found[u[:, 0] == inputs[70, 0], 1] = np.nan
 
     spoil_runs(solver, monkeypatch, spoil)
-    found = follow_samples(solver, solver.inputs.p, z, inputs)
-    assert found.general_count == 2
+    found = follow_samples(solver, z, resting_inputs(inputs))
+    assert len(by_general_path) == 2
     np.testing.assert_allclose(found.z, honest.z, atol=1e-12)
 
 

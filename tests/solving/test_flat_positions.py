@@ -54,6 +54,23 @@ def translates(state, turn, omega, alpha):
         assert link.angular_acceleration == pytest.approx(second, abs=1e-12 * scale)
 
 
+@pytest.mark.parametrize("rates", [(3.0, 2.0, 0.5, -7.0), (0.0, 2.0, 0.0, -7.0), (3.0, 0.0, 0.0, 5.0)])
+def test_a_second_input_runs_at_rates_that_are_no_multiple_of_the_first_ones(rates):
+    omega, alpha, arm_velocity, arm_acceleration = rates
+    value = planar.to_dict(cranks_on_one_rod(0.0, (0, 2, 0.8), omega, alpha))
+    value["links"]["rod"]["points"]["R"] = [0.4, 0.3]
+    value["links"]["arm"] = {"ends": ["R", "T"], "length": 0.5}
+    value["pairs"].append({"turning": "R"})
+    value["inputs"].append({"pair": "R", "position": 0.7, "velocity": arm_velocity, "acceleration": arm_acceleration})
+    state = planar.solve(planar.from_dict(value))
+    assert any("the only one that goes on" in remark for remark in state.remarks)
+    for crank in ("c0", "c1", "c2"):
+        assert state.link(crank).angular_velocity == pytest.approx(omega, abs=1e-11)
+        assert state.link(crank).angular_acceleration == pytest.approx(alpha, abs=1e-11)
+    assert state.link("rod").angular_acceleration == pytest.approx(0.0, abs=1e-11)
+    assert abs(state.link("arm").angular_acceleration) == pytest.approx(abs(arm_acceleration), abs=1e-11)
+
+
 @pytest.mark.parametrize("turn", [0.0, np.pi])
 @pytest.mark.parametrize(
     "places", part([(0, 2, 0.8), (0, 1, 2), (0, 2, -1), (0, 1, 5), (0, 2, 0.8, 1.3), (0, 0.3, 0.6, 0.9, 1.2)], 1)

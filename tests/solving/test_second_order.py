@@ -5,7 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from planar.solving.continuation.second_order import branch_directions, is_same_direction, nearest_direction
+from planar.solving.continuation.bifurcation import branch_directions, is_same_direction, nearest_direction
 
 
 def form(first, second):

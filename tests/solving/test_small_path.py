@@ -16,6 +16,7 @@ from planar.solving import position
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
 from planar.solving.continuation.fast_path import fast_position, fast_run
+from planar.solving.continuation.run_samples import InputRates
 from planar.solving.position import PositionSolver, SolvedMechanism
 from tests.acceptance import spoil_runs
 from tests.builders import four_bar
@@ -40,7 +41,7 @@ def mechanism(theta=1.0, lengths=ROCKER):
 def turn(solver, rows=91):
     """Inputs of a turn (rows, inputs), with velocity 2 and acceleration 3."""
     u = solver.inputs.u + np.linspace(0.0, 2.0 * np.pi, rows)[:, None]
-    return u, np.full_like(u, 2.0), np.full_like(u, 3.0)
+    return InputRates(u, np.full_like(u, 2.0), np.full_like(u, 3.0), np.zeros_like(u))
 
 
 @pytest.mark.parametrize("many", [1, 7, CHUNK_SIZES[-1], CHUNK_SIZES[0], CHUNK_SIZES[0] + CHUNK_SIZES[-1] + 3])
@@ -76,37 +77,37 @@ def test_the_quick_path_tells_what_the_general_one_does(name, monkeypatch):
 
 def test_a_run_is_told_block_after_block_where_nothing_is_near():
     solver = PositionSolver(mechanism())
-    u, u1, u2 = turn(solver)
-    found = path.follow_samples(solver, solver.inputs.p, solver.find_assembly().z, u, (), (u1, u2))
-    assert found.general_count == 0
-    assert found.fast_samples.is_sure.all()
-    assert 0.0 < found.fast_samples.residual <= solver.tolerance
+    inputs = turn(solver)
+    found = path.follow_samples(solver, solver.find_assembly().z, inputs)
+    assert len(found.z) == len(inputs.u)
+    assert found.is_sure[1:].all()
+    assert 0.0 < found.residual <= solver.tolerance
 
 
 def test_a_course_ends_before_a_row_that_has_flipped(monkeypatch):
     solver = PositionSolver(mechanism())
     z, flipped = (each.find_assembly().z for each in (solver, PositionSolver(four_bar(*ROCKER, 1.0, -1))))
-    u, u1, u2 = turn(solver)
-    assert len(fast_run(solver, z, u, u1, u2).z) == len(u)
-    other = fast_run(solver, flipped, u, u1, u2).z
+    inputs = turn(solver)
+    assert len(fast_run(solver, z, inputs).z) == len(inputs.u)
+    other = fast_run(solver, flipped, inputs).z
 
-    def flip(found, inputs):
+    def flip(found, given):
         found[29:] = other[30:]
 
     spoil_runs(solver, monkeypatch, flip)
-    assert len(fast_run(solver, z, u, u1, u2).z) == 30
+    assert len(fast_run(solver, z, inputs).z) == 30
 
 
 @pytest.mark.parametrize("spoil", [1e-6, np.nan])
 def test_a_course_ends_before_a_row_that_is_open(monkeypatch, spoil):
     solver = PositionSolver(mechanism())
-    u, u1, u2 = turn(solver)
+    inputs = turn(solver)
 
-    def open_pin(found, inputs):
+    def open_pin(found, given):
         found[40, 1] += spoil
 
     spoil_runs(solver, monkeypatch, open_pin)
-    assert len(fast_run(solver, solver.find_assembly().z, u, u1, u2).z) == 41
+    assert len(fast_run(solver, solver.find_assembly().z, inputs).z) == 41
 
 
 @pytest.mark.parametrize("order", ["first", "second"])
@@ -151,7 +152,7 @@ def test_a_drive_leads_where_following_does():
     here = known.solver
     for theta in (1.0, 1.01, 1.125, 3.0, -4.0, 30.0):
         u = np.array([theta])
-        wanted = path.follow_to(here, here.inputs.p, known.assembly.z, here.inputs.u, u)
+        wanted = path.follow_to(here, known.assembly.z, here.inputs.u, u)
         np.testing.assert_allclose(known.nearby_positions.unknowns_at([theta]), wanted, atol=1e-12)
 
 
@@ -173,7 +174,7 @@ def test_a_drive_by_the_formula_of_one_step_is_the_state_to_which_following_lead
         there = PositionSolver(moved)
         quick = known.nearby_positions.position_at(moved)
         try:
-            z = path.follow_to(here, here.inputs.p, known.assembly.z, here.inputs.u, there.inputs.u)
+            z = path.follow_to(here, known.assembly.z, here.inputs.u, there.inputs.u)
         except planar.NoAnswer:
             assert quick is None
             continue
@@ -216,12 +217,10 @@ def test_a_run_from_within_is_the_two_runs_from_there(name):
     z = here.find_assembly().z
     rows = here.inputs.u + np.linspace(-0.3, 0.2, 26)[:, None] * (np.arange(len(here.inputs.u)) == 0)
     rows += here.inputs.u - rows[MIDDLE]
-    u1, u2 = np.ones_like(rows), np.zeros_like(rows)
+    inputs = InputRates(rows, np.ones_like(rows), np.zeros_like(rows), np.zeros_like(rows))
     for _ in range(3):
-        whole = fast_run(here, z, rows, u1, u2, MIDDLE)
-        down, up = (
-            fast_run(here, z, rows[way], u1[way], u2[way]) for way in (slice(MIDDLE, None, -1), slice(MIDDLE, None))
-        )
+        whole = fast_run(here, z, inputs, MIDDLE)
+        down, up = (fast_run(here, z, inputs.select(part)) for part in (slice(MIDDLE, None, -1), slice(MIDDLE, None)))
         if len(down.z) + len(up.z) <= len(rows):
             assert whole is None
             continue

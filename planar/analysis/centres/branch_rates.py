@@ -12,7 +12,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.jets import Jet
 from planar.results.motion import State
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
-from planar.solving.continuation.second_order import branch_directions
+from planar.solving.continuation.bifurcation import branch_directions
 
 
 def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str, Array], ...]:

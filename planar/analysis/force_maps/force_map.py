@@ -19,7 +19,7 @@ from planar.foundation.time_limit import stops_in_time
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.grids.input_grid import InputGrid
+from planar.solving.input_grid import InputGrid
 from planar.solving.position import solved_mechanism
 
 MAX_POSITIONS = 1_000_000

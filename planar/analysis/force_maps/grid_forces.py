@@ -15,7 +15,8 @@ from planar.foundation.time_limit import stop_if_over
 from planar.results.motion import Motion
 from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.continuation.path import follow_samples
-from planar.solving.grids.grid_motion import motion_at_inputs
+from planar.solving.continuation.run_samples import resting_inputs
+from planar.solving.input_grid import motion_at_inputs
 from planar.solving.position import PositionSolver
 
 MAX_PREDICTOR_ERROR = 0.5
@@ -72,7 +73,7 @@ class GridForces:
         for k in range(many):
             stop_if_over("while the worst cases were refined")
             try:
-                way = follow_samples(self.solver, p, z[k], np.stack([start[k], u[k]]))
+                way = follow_samples(self.solver, z[k], resting_inputs(np.stack([start[k], u[k]])))
             except NoAnswer:
                 continue
             if way.stopped is None:

@@ -25,7 +25,8 @@ from planar.foundation.short_repr import short_repr
 from planar.foundation.time_limit import all_within_time
 from planar.model.wording import amount
 from planar.solving.continuation.path import follow_samples
-from planar.solving.grids.input_grid import Border, InputGrid
+from planar.solving.continuation.run_samples import resting_inputs
+from planar.solving.input_grid import Border, InputGrid
 
 STENCIL = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Parts of its width at which the neighbourhood of a greatest force is looked at, along each input."""
@@ -218,10 +219,10 @@ class WorstCaseSearch:
         beyond = there.copy()
         beyond[self.grid.columns[along]] += SEARCHED_STEPS * far * self.step[along]
         try:
-            aside = follow_samples(solver, solver.inputs.p, self.grid.z[border.node], np.stack([start, there]))
+            aside = follow_samples(solver, self.grid.z[border.node], resting_inputs(np.stack([start, there])))
             if aside.stopped is not None:
                 return None
-            way = follow_samples(solver, solver.inputs.p, aside.z[-1], np.stack([there, beyond]))
+            way = follow_samples(solver, aside.z[-1], resting_inputs(np.stack([there, beyond])))
         except NoAnswer:
             return None
         if way.stopped is None or way.last_position is None or way.stopped.outcome is not Outcome.DEAD_POINT:
@@ -257,7 +258,7 @@ class WorstCaseSearch:
         parts = nearer if border.outcome is Outcome.DEAD_POINT else np.array([1.0, 0.0])
         places = border.u + (start - border.u) * parts[:, None]
         try:
-            way = follow_samples(self.maker.solver, self.maker.solver.inputs.p, z, places)
+            way = follow_samples(self.maker.solver, z, resting_inputs(places))
             forces = self.maker.forces(self.maker.motion(way.z, places[: len(way.z)]))
         except NoAnswer:
             return None

@@ -9,8 +9,8 @@ import numpy as np
 from planar.assemblies.circuits.traced_circuit import BranchLeg, TracedCircuit
 from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
-from planar.solving.continuation.pair_motions import pair_motions_at
 from planar.solving.continuation.path_pieces import PathPiece
+from planar.solving.continuation.solution_curve import pair_motions_at
 from planar.solving.stops import PairStops
 
 
@@ -20,17 +20,17 @@ def stop_positions(circuits: Sequence[TracedCircuit], stops: PairStops) -> Itera
         for legs in circuit.branches:
             for leg in legs:
                 for piece in leg.pieces:
-                    for place in _passed_on(circuit, leg, piece, stops):
+                    for place in _passed_on(leg, piece, stops):
                         yield leg.position(place) * circuit.scale
 
 
-def _passed_on(circuit: TracedCircuit, leg: BranchLeg, piece: PathPiece, stops: PairStops) -> Iterator[float]:
+def _passed_on(leg: BranchLeg, piece: PathPiece, stops: PairStops) -> Iterator[float]:
     """Where on its way the input is as pairs pass their stops on a piece of the curve."""
     limits = np.array([stops.low, stops.high])
 
     def gaps(x: float) -> Array:
         """How far pairs are from their stops, whole turns aside, with the rate along the curve (2, stops, 2)."""
-        motions = pair_motions_at(circuit.solver, stops.pairs, leg.curve, piece.arc.point_at(leg.curve, x))
+        motions = pair_motions_at(stops.pairs, leg.curve, piece.arc.point_at(leg.curve, x))
         off = np.where(np.isfinite(limits), motions[:, 0] - limits, np.inf)
         rate = np.broadcast_to(motions[:, 1], off.shape)
         half = np.where(stops.is_periodic & np.isfinite(off), 0.5 * off, 0.0)

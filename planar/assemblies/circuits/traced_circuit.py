@@ -10,12 +10,17 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd, join_names
-from planar.solving.continuation.path_pieces import PathPiece
-from planar.solving.continuation.period import MAX_PIECES
+from planar.solving.continuation.path_pieces import (
+    MAX_PIECES,
+    PathPiece,
+    follow_circuit,
+    is_endless,
+    moving_pieces,
+    split_at_dead_points,
+)
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.position import PositionSolver
-from planar.solving.runs.closed_circuit import follow_circuit, is_endless, moving_pieces, split_at_dead_points
 
 TURN = 2.0 * pi
 
@@ -135,7 +140,7 @@ def trace_circuit(solver: PositionSolver, index: int, z: Array) -> TracedCircuit
     walk = _curve_tracker(solver, index, z, 1.0)
     first = float(solver.inputs.u[index])
     try:
-        whole = follow_circuit(solver, walk)
+        whole = follow_circuit(walk)
     except NoAnswer as problem:
         return _trace_open_circuit(solver, index, z, problem.reason.split(";")[0])
     legs = [BranchLeg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.branches]
@@ -189,4 +194,4 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
 def _curve_tracker(solver: PositionSolver, index: int, z: Array, way: float) -> CurveTracker:
     axis = np.zeros_like(solver.inputs.u)
     axis[index] = way
-    return CurveTracker.from_position(solver, solver.inputs.p, (z, solver.inputs.u), axis)
+    return CurveTracker(solver, z, solver.inputs.u, axis)

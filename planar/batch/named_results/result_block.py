@@ -28,7 +28,7 @@ from planar.model.link_shapes import LinkPlace, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.runs.time_run import input_law_rates
+from planar.solving.runs.continuous_run import input_law_rates
 
 LEAST_STROKE_STEPS = 24
 """Steps of a stroke between limits of its own, so that they show how links turn."""

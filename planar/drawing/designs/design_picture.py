@@ -26,7 +26,7 @@ from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import value_and_rates
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 from planar.solving.position import solve
 from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction, WantedPath

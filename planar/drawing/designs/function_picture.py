@@ -15,7 +15,7 @@ from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import TURN
 from planar.model.file_units import display_unit
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 from planar.synthesis.synthesis import SynthesisedDesign
 from planar.synthesis.task.starts import motion_kind
 from planar.synthesis.task.synthesis_task import SynthesisTask, WantedFunction

@@ -44,6 +44,7 @@ from planar.pages.data.dimension_numbers import DimensionNumber, DimensionNumber
 from planar.results.motion import Motion
 from planar.solving.continuation.fast_path import fast_run
 from planar.solving.continuation.path import follow_samples
+from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver, solved_mechanism
 
 Positions = Sequence[Mapping[str, Frame]]
@@ -160,16 +161,16 @@ def _followed_samples(solver: PositionSolver, z: Array, samples: Array, through:
 
     Quickly as far as that goes; from there on by the general path, `through` change points, where that is wanted.
     """
-    p, places, reached = solver.inputs.p, samples[STEP_PARTS::STEP_PARTS], 0
+    places, reached = samples[STEP_PARTS::STEP_PARTS], 0
     found: Array = np.empty((0, z.size))
-    run = fast_run(solver, z, samples, np.zeros_like(samples), np.zeros_like(samples))
+    run = fast_run(solver, z, resting_inputs(samples))
     if run is not None and len(run.z):
         found = run.z[STEP_PARTS::STEP_PARTS]
         reached = len(found)
     if through and reached < len(places):
         ahead = samples[reached * STEP_PARTS :: STEP_PARTS]
         with suppress(NoAnswer):
-            rest = follow_samples(solver, p, found[-1] if reached else z, ahead).z[1:]
+            rest = follow_samples(solver, found[-1] if reached else z, resting_inputs(ahead)).z[1:]
             found = np.concatenate([found, rest])
     return places[: len(found)], found
 

@@ -19,7 +19,7 @@ BORDER_SIZE = 1e-4
 POWER_STEPS, POWER_CHANGE = 40, 1e-2
 """Steps of the power method for a norm, and the part of it by which the last of them changes it."""
 SUBSPACE_STEPS, MORE_VECTORS = 8, 4
-"""Steps of the iteration of a subspace, and by how many vectors it is larger than what is wanted."""
+"""Steps of the iteration of a subspace, and by how many vectors it is larger than what it is for."""
 NORM_SAFETY = 1.1
 """A norm found so is too small by less than this factor."""
 
@@ -66,14 +66,14 @@ class BorderedJacobian:
         By iteration of a subspace that is somewhat larger: Golub and Van Loan, sec. 8.2.4.
         """
         rows, even = len(self.border) - 1, np.ones(len(self.border))
-        many = min(count + MORE_VECTORS, rows)
-        left = np.linalg.qr(np.random.default_rng(rows).normal(size=(rows, many)))[0]
+        vector_count = min(count + MORE_VECTORS, rows)
+        basis = np.linalg.qr(np.random.default_rng(rows).normal(size=(rows, vector_count)))[0]
         for _ in range(SUBSPACE_STEPS):
-            left = np.linalg.qr(self.transposed_pseudo_inverse(self.pseudo_inverse(left, even), even))[0]
-        turned, inverses, right = np.linalg.svd(self.pseudo_inverse(left, even).T, full_matrices=False)
-        order = slice(min(count, many) - 1, None, -1) if count < many else slice(None, None, -1)
+            basis = np.linalg.qr(self.transposed_pseudo_inverse(self.pseudo_inverse(basis, even), even))[0]
+        rotation, inverses, right = np.linalg.svd(self.pseudo_inverse(basis, even).T, full_matrices=False)
+        order = slice(min(count, vector_count) - 1, None, -1) if count < vector_count else slice(None, None, -1)
         values = 1.0 / np.maximum(inverses, 1e-300)
-        return (left @ turned)[:, order], values[order], np.vstack([right[order], self.tangent])
+        return (basis @ rotation)[:, order], values[order], np.vstack([right[order], self.tangent])
 
     def least_singular_value(self, sizes: Array) -> float:
         """The least singular value of J_s."""
@@ -88,20 +88,20 @@ class BorderedJacobian:
         scaled = change.divide_columns(sizes).single
 
         def squared(vector: Array) -> Array:
-            moved = self.pseudo_inverse(scaled @ vector, sizes)
-            back: Array = scaled.T @ self.transposed_pseudo_inverse(moved, sizes)
+            image = self.pseudo_inverse(scaled @ vector, sizes)
+            back: Array = scaled.T @ self.transposed_pseudo_inverse(image, sizes)
             return back
 
         return norm_by_powers(squared, len(self.border))
 
 
-def closing_step(jacobian: SparseMatrices, residual: Array, left: Array, null: Array) -> Array:
+def closing_step(jacobian: SparseMatrices, residual: Array, left_null: Array, null: Array) -> Array:
     """x (n + 1,), normal to null vectors (n + 1, k + 1), that closes F in all directions but those left ones (n, k)."""
-    factors = factorised(jacobian.bordered_by_blocks(left, null.T))
-    many = null.shape[0]
+    factors = factorised(jacobian.bordered_by_blocks(left_null, null.T))
+    n = null.shape[0]
     if factors is None:
-        return np.full(many, np.nan)
-    step: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:many]
+        return np.full(n, np.nan)
+    step: Array = factors.solve(np.concatenate([-residual, np.zeros(null.shape[1])]))[:n]
     return step
 
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple, Protocol
+from math import perm
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions
+from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
+from planar.foundation.jets import Jet, value_and_rates
+from planar.model.pairs import Pair
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.continuation.bordered_jacobian import BorderedJacobian
 from planar.solving.newton import SystemFunction, correct, correct_at_rank
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10
@@ -31,22 +36,11 @@ SHORT_REGULAR_DISTANCE = 0.25
 """rad or sizes: a distance from singular Jacobians from which on no step is shortened."""
 MAX_SOLVED_STEP = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
-
-
-class CurveSolver(Protocol):
-    """What a curve needs of a solver."""
-
-    functions: EquationFunctions
-
-    def max_residuals(self, z: Array, u: Array) -> Array:
-        """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
-
-    def max_residual(self, z: Array, u: Array) -> float:
-        """The same at one position, z (unknowns,) and u (inputs,)."""
-
-    @property
-    def tolerance(self) -> float:
-        """What the residual check lets pass."""
+DEAD_POINT_TOLERANCE = 1e-7
+"""The square root of twice what the inputs may have left (rad or sizes) of their way to where they turn back at a dead
+point to rounding; also the least rate of the inputs along the curve from which one is left."""
+RESTING_INPUT_RATE = 1e-13
+"""A rate of the inputs along the curve, for one of what is farthest out, that is rounding."""
 
 
 class CurvePoint(NamedTuple):
@@ -62,6 +56,25 @@ class CurvePoint(NamedTuple):
     def input_rate(self) -> float:
         """The rate of the inputs along the curve: positive where they go on, zero at a dead point."""
         return float(self.tangent[-1])
+
+    @property
+    def is_dead_point(self) -> bool:
+        """Whether the point is a dead point to rounding.
+
+        With rate g and second derivative b of the inputs by arc length it is g^2 / 2b before where they turn back. A
+        small rate alone does not tell: it is small as well where slides go far out for little of the inputs.
+        """
+        g, b = self.input_rate, float(self.curvature[-1])
+        is_near = g * g <= DEAD_POINT_TOLERANCE**2 * abs(b)
+        return is_near or abs(g) * max(1.0, greatest_size(self.y)) < RESTING_INPUT_RATE
+
+    def ahead(self, distance: float) -> Array:
+        """Where the curve is so far ahead (n + 1,), to second order."""
+        return self.y + distance * self.tangent + 0.5 * distance**2 * self.curvature
+
+    def towards(self, direction: Array) -> CurvePoint:
+        """The same point, to be left less than a right angle from a direction (n + 1,)."""
+        return self if self.tangent @ direction >= 0.0 else self.reversed()
 
     def reversed(self) -> CurvePoint:
         """The same point, to be left the other way."""
@@ -86,10 +99,6 @@ class ImplicitCurve:
         """J (rows, n + 1)."""
         return self.residuals_and_jacobian(y)[1]
 
-    def residuals(self, y: Array) -> Array:
-        """F (rows,)."""
-        return self.residuals_and_jacobian(y)[0]
-
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
         change: Array = self.jacobian(y + DIFFERENCE_STEP * direction) @ direction - self.jacobian(y) @ direction
@@ -98,72 +107,72 @@ class ImplicitCurve:
     def point_at(self, y: Array, towards: Array, with_distance: bool = True) -> CurvePoint:
         """The point at y, its tangent less than a right angle from a direction; its regular distance is not a number
         where it is not asked for."""
-        slope = self.jacobian(y)
-        if isinstance(slope, SparseMatrices):
-            point = self._sparse_point_at(y, towards, slope, with_distance)
+        jacobian = self.jacobian(y)
+        if isinstance(jacobian, SparseMatrices):
+            point = self._sparse_point_at(y, towards, jacobian, with_distance)
             if point is not None:
                 return point
-            slope = np.asarray(slope)
-        least = self._least_singular_value(slope)
-        many = len(y) - 1
-        if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
-            system = stack_row(slope, towards)
-            tangent = _solve_regular(system, append_number(np.zeros(many), 1.0))
+            jacobian = np.asarray(jacobian)
+        least_value = self._least_singular_value(jacobian)
+        n = len(y) - 1
+        if len(jacobian) == n and least_value > REGULAR_SINGULAR_VALUE:
+            system = stack_row(jacobian, towards)
+            tangent = _solve_regular(system, input_axis(n + 1))
             size = np.inf if tangent is None else length_of(tangent)
             if tangent is not None and size * length_of(towards) < MAX_TANGENT_RATIO:
                 tangent /= size
-                system[many] = tangent
-                bend = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
-                distance = self._regular_distance(y, tangent, slope, least) if with_distance else np.nan
-                return CurvePoint(y, tangent, bend, distance)
-        u, s, vt = np.linalg.svd(slope)
-        tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
-        kept = s[:many] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
-        along = (u.T[:many] @ self.second_derivative(y, tangent)) if many else np.zeros(0)
-        bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
-        return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
+                system[n] = tangent
+                curvature = _solve_shortest(system, append_number(-self.second_derivative(y, tangent), 0.0))
+                distance = self._regular_distance(y, tangent, jacobian, least_value) if with_distance else np.nan
+                return CurvePoint(y, tangent, curvature, distance)
+        u, s, vt = np.linalg.svd(jacobian)
+        tangent = vt[n] if vt[n] @ towards >= 0.0 else -vt[n]
+        is_nonzero = s[:n] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if n else np.zeros(0, dtype=bool)
+        along = (u.T[:n] @ self.second_derivative(y, tangent)) if n else np.zeros(0)
+        curvature = -vt[:n].T @ np.where(is_nonzero, along / np.where(is_nonzero, s[:n], 1.0), 0.0)
+        return CurvePoint(y, tangent, curvature, self._regular_distance(y, tangent, jacobian, least_value))
 
     def _sparse_point_at(
-        self, y: Array, towards: Array, slope: SparseMatrices, with_distance: bool
+        self, y: Array, towards: Array, jacobian: SparseMatrices, with_distance: bool
     ) -> CurvePoint | None:
         """The same of many unknowns; None where all singular values have to be looked at."""
         try:
-            bordered = BorderedJacobian(slope, towards)
+            bordered = BorderedJacobian(jacobian, towards)
         except ValueError:
             return None
-        sizes = slope.column_norms(MIN_COLUMN_NORM)
-        least = bordered.least_singular_value(sizes)
-        if not (least > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
+        sizes = jacobian.column_norms(MIN_COLUMN_NORM)
+        least_value = bordered.least_singular_value(sizes)
+        if not (least_value > REGULAR_SINGULAR_VALUE and bordered.tangent_ratio < MAX_TANGENT_RATIO):
             return None
         tangent = bordered.tangent
-        bend = bordered.step(-self.second_derivative(y, tangent), tangent)
-        distance = self._sparse_regular_distance(y, bordered, sizes, least) if with_distance else np.nan
-        return CurvePoint(y, tangent, bend, distance)
+        curvature = bordered.step(-self.second_derivative(y, tangent), tangent)
+        distance = self._sparse_regular_distance(y, bordered, sizes, least_value) if with_distance else np.nan
+        return CurvePoint(y, tangent, curvature, distance)
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least_value: float) -> float:
         """The same as `_regular_distance`."""
         return np.inf
 
-    def _least_singular_value(self, slope: Array) -> float:
+    def _least_singular_value(self, jacobian: Array) -> float:
         """The least singular value of J, columns of one size, so that a small link counts as much as a large one."""
-        many = slope.shape[1] - 1
-        if many == 0:
+        n = jacobian.shape[1] - 1
+        if n == 0:
             return 1.0
-        return float(np.linalg.svd(slope / column_norms(slope, MIN_COLUMN_NORM), compute_uv=False)[many - 1])
+        return float(np.linalg.svd(jacobian / column_norms(jacobian, MIN_COLUMN_NORM), compute_uv=False)[n - 1])
 
-    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least_value: float) -> float:
         """How far along the curve J is known to keep its rank: not asked of a curve that may cross others."""
         return np.inf
 
     def correct(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
 
-        def step(slope: Array | SparseMatrices, left: Array) -> Array:
-            if isinstance(slope, SparseMatrices):
-                sparse = _sparse_step(slope, left, normal)
+        def step(jacobian: Array | SparseMatrices, residuals: Array) -> Array:
+            if isinstance(jacobian, SparseMatrices):
+                sparse = _sparse_step(jacobian, residuals, normal)
                 if sparse is not None:
                     return sparse
-            return _solve_shortest(stack_row(np.asarray(slope), normal), append_number(-left, 0.0))
+            return _solve_shortest(stack_row(np.asarray(jacobian), normal), append_number(-residuals, 0.0))
 
         y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
         return y if gap <= CLOSED_TOLERANCE * max(1.0, greatest_size(y)) else None
@@ -175,9 +184,10 @@ class SolutionCurve(ImplicitCurve):
     Lengths are in sizes of the mechanism, angles in rad. J = dF/dy loses rank at change points.
     """
 
-    def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
-        self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
-        self._is_along_input = len(way) == 1 and way[0] == 1.0
+    def __init__(self, solver: PreparedMechanism, start: Array, direction: Array):
+        self.solver, self.functions, self.p = solver, solver.functions, solver.inputs.p
+        self.start, self.input_direction = start, direction
+        self._is_along_input = len(direction) == 1 and direction[0] == 1.0
 
     def inputs(self, y: Array) -> Array:
         """The inputs (inputs,) at a point, or at points (points, inputs)."""
@@ -193,16 +203,16 @@ class SolutionCurve(ImplicitCurve):
 
     def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array | SparseMatrices]:
         """F (rows,) and J (rows, n + 1)."""
-        left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
+        residuals, jacobian = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
         if self._is_along_input:
-            return left, slope
-        if isinstance(slope, SparseMatrices):
-            return left, slope.join_last_columns(self.input_direction)
-        many = len(y) - 1
-        narrow = np.empty((len(slope), many + 1))
-        narrow[:, :many] = slope[:, :many]
-        narrow[:, many] = slope[:, many:] @ self.input_direction
-        return left, narrow
+            return residuals, jacobian
+        if isinstance(jacobian, SparseMatrices):
+            return residuals, jacobian.join_last_columns(self.input_direction)
+        n = len(y) - 1
+        narrow = np.empty((len(jacobian), n + 1))
+        narrow[:, :n] = jacobian[:, :n]
+        narrow[:, n] = jacobian[:, n:] @ self.input_direction
+        return residuals, narrow
 
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
@@ -229,7 +239,7 @@ class SolutionCurve(ImplicitCurve):
         """Whether a point passes the residual check."""
         return self.solver.max_residual(y[:-1], self.inputs(y)) <= self.solver.tolerance
 
-    def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least_value: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
 
         Constraints that nearly depend on one another all along keep J near a singular one, but do not bring it nearer.
@@ -239,37 +249,37 @@ class SolutionCurve(ImplicitCurve):
         """
         if len(y) == 1:
             return np.inf
-        sizes = column_norms(slope, MIN_COLUMN_NORM)
-        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - slope) / (sizes * DIFFERENCE_STEP)
-        clear = float(singular_distance(least, np.linalg.norm(change)))
-        if clear >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
-            return clear
-        turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
-        return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
+        sizes = column_norms(jacobian, MIN_COLUMN_NORM)
+        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - jacobian) / (sizes * DIFFERENCE_STEP)
+        distance = float(singular_distance(least_value, np.linalg.norm(change)))
+        if distance >= SHORT_REGULAR_DISTANCE or least_value < ZERO_SINGULAR_VALUE:
+            return distance
+        relative = np.linalg.lstsq(jacobian / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
+        return max(distance, 1.0 / max(float(np.linalg.norm(relative)), 1e-300))
 
-    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least: float) -> float:
-        slope, tangent = bordered.jacobian, bordered.tangent
-        there = self.jacobian(y + DIFFERENCE_STEP * tangent)
-        assert isinstance(there, SparseMatrices)
-        change = SparseMatrices(slope.pattern, (there.values - slope.values) / DIFFERENCE_STEP)
-        clear = float(singular_distance(least, np.asarray(length_of(change.divide_columns(sizes).values))))
-        if clear >= SHORT_REGULAR_DISTANCE:
-            return clear
-        return max(clear, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
+    def _sparse_regular_distance(self, y: Array, bordered: BorderedJacobian, sizes: Array, least_value: float) -> float:
+        jacobian, tangent = bordered.jacobian, bordered.tangent
+        ahead = self.jacobian(y + DIFFERENCE_STEP * tangent)
+        assert isinstance(ahead, SparseMatrices)
+        change = SparseMatrices(jacobian.pattern, (ahead.values - jacobian.values) / DIFFERENCE_STEP)
+        distance = float(singular_distance(least_value, np.asarray(length_of(change.divide_columns(sizes).values))))
+        if distance >= SHORT_REGULAR_DISTANCE:
+            return distance
+        return max(distance, 1.0 / max(bordered.relative_change(change, sizes), 1e-300))
 
     def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
         `rank_loss` is by how much the Jacobian's rank falls at the change point; the inputs move only `with_inputs`.
         """
-        many = len(y) - 1
-        return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)
+        n = len(y) - 1
+        return correct_at_rank(self.residuals_and_jacobian, y, n - rank_loss, n + with_inputs)
 
 
-def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | None:
+def _sparse_step(jacobian: SparseMatrices, residuals: Array, normal: Array) -> Array | None:
     """The step that closes what is open, normal to a direction; None where it is that of a singular system."""
     try:
-        step = BorderedJacobian(slope, normal).step(-left)
+        step = BorderedJacobian(jacobian, normal).step(-residuals)
     except ValueError:
         return None
     return step if greatest_size(step) < MAX_SOLVED_STEP else None
@@ -278,9 +288,9 @@ def _sparse_step(slope: SparseMatrices, left: Array, normal: Array) -> Array | N
 def _solve_shortest(system: Array, known: Array) -> Array:
     """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
     if system.shape[0] == system.shape[1]:
-        found = _solve_regular(system, known)
-        if found is not None and greatest_size(found) < MAX_SOLVED_STEP:
-            return found
+        solution = _solve_regular(system, known)
+        if solution is not None and greatest_size(solution) < MAX_SOLVED_STEP:
+            return solution
     return np.linalg.lstsq(system, known, rcond=1e-14)[0]
 
 
@@ -292,12 +302,36 @@ def _solve_regular(system: Array, known: Array) -> Array | None:
         return None
 
 
+def input_axis(size: int) -> Array:
+    """The direction (n + 1,) in which the inputs go on while the unknowns rest."""
+    return append_number(np.zeros(size - 1), 1.0)
+
+
+def pair_motions_at(pairs: Sequence[Pair], curve: SolutionCurve, point: CurvePoint) -> Array:
+    """Position, first and second derivative by arc length of the relative motions at pairs (pairs, 3), SI."""
+    if not pairs:
+        return np.zeros((0, 3))
+    setup = curve.solver
+    rates, second = curve.widen_direction(point.tangent), curve.widen_direction(point.curvature)
+    motion = curve.functions.kinematics(curve.unknowns_and_inputs(point.y), rates, second, curve.p)
+    bodies = dict.fromkeys(link for pair in pairs for link in pair.bodies)
+    joined = {pair.name: setup.pairs[pair.name] for pair in pairs if pair.name in setup.pairs}
+    names = [(link, part) for link in bodies for part in FRAME_PARTS]
+    names += [(name, part) for name, pair in joined.items() for part, _ in pair.coordinate_kinds]
+    columns = [setup.column[name] for name in names if name in setup.column]
+    parts = np.stack([motion.w, motion.w1, motion.w2], axis=1)[columns] * setup.scale[columns, None]
+    jets = {column: Jet(*rates) for column, rates in zip(columns, parts.tolist(), strict=True)}
+    frames, coordinates = frames_from_coordinates(jets, setup.column, bodies, joined)
+    motions = [value_and_rates(pair.input_position_at(setup.shapes, frames, coordinates)) for pair in pairs]
+    return np.array(motions, dtype=float)
+
+
 class Arc(NamedTuple):
     """The curve from one point to the next: a polynomial in how far one is along an axis.
 
     Between two points it is near the curve and `SolutionCurve.correct` carries it there. Beside a change point it is
-    the curve to round-off, and nothing can correct it: there the slope is singular. `lost` is how much rank it lacks at
-    that change point, and 0 where there is none.
+    the curve to round-off, and nothing can correct it: there the slope is singular. `rank_loss` is how much rank it
+    lacks at that change point, and 0 where there is none.
     """
 
     before: CurvePoint
@@ -306,7 +340,7 @@ class Arc(NamedTuple):
     axis: Array
     unit_length: float
     coefficients: Array
-    "coefficients (degree + 1, n + 1), of powers of the distance over `half`"
+    "coefficients (degree + 1, n + 1), of powers of the distance over `unit_length`"
     rank_loss: int
 
     @property
@@ -317,33 +351,33 @@ class Arc(NamedTuple):
     @property
     def ends(self) -> tuple[float, float]:
         """How far its two ends are along the axis."""
-        first, last = (float(self.axis @ (point.y - self.origin)) for point in (self.before, self.after))
-        return first, last
+        return self.place(self.before.y), self.place(self.after.y)
+
+    def place(self, y: Array) -> float:
+        """How far a point is along the axis."""
+        return float(self.axis @ (y - self.origin))
 
     def polynomial(self, x: float, order: int = 0) -> Array:
         """The polynomial, or a derivative of it (n + 1,), so far along the axis."""
         shape = self.coefficients
-        if not order:
-            return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
-        powers = np.arange(len(shape))
         for _ in range(order):
-            shape, powers = shape[1:] * powers[1 : len(shape), None] / self.unit_length, powers[: len(shape) - 1]
+            shape = shape[1:] * np.arange(1, len(shape))[:, None] / self.unit_length
         return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
 
     def input_position(self, x: float) -> float:
         """How far the inputs are on their way so far along the axis, by the polynomial."""
-        part, found = x / self.unit_length, 0.0
+        part, value = x / self.unit_length, 0.0
         for coefficient in reversed(self.coefficients[:, -1].tolist()):
-            found = found * part + coefficient
-        return found
+            value = value * part + coefficient
+        return value
 
     def curve_coordinates(self, curve: SolutionCurve, x: float) -> Array:
         """The point of the curve so far along the axis (n + 1,)."""
         rough = self.polynomial(x)
         if self.is_exact:
             return curve.correct_beside_bifurcation(rough, self.rank_loss, with_inputs=True)
-        found = curve.correct(rough, self.axis)
-        return rough if found is None else found
+        y = curve.correct(rough, self.axis)
+        return rough if y is None else y
 
     def point_at(self, curve: SolutionCurve, x: float, with_distance: bool = True) -> CurvePoint:
         """The point of the curve so far along the axis, with its tangent; see `ImplicitCurve.point_at`."""
@@ -353,9 +387,9 @@ class Arc(NamedTuple):
         first, second = self.polynomial(x, 1), self.polynomial(x, 2)
         speed = float(np.linalg.norm(first))
         tangent = first / speed
-        bend = (second - tangent * (tangent @ second)) / speed**2
+        curvature = (second - tangent * (tangent @ second)) / speed**2
         sense = 1.0 if tangent @ self.before.tangent >= 0.0 else -1.0
-        return CurvePoint(y, sense * tangent, bend, 0.0)
+        return CurvePoint(y, sense * tangent, curvature, 0.0)
 
 
 def arc_between(before: CurvePoint, after: CurvePoint) -> Arc:
@@ -382,10 +416,6 @@ def fit_polynomial(
 @cache
 def _hermite_matrix(places: tuple[float, ...]) -> Array:
     """Values, first and second derivatives of the powers at the places (3 places, powers)."""
-    degree = 3 * len(places)
-    rows = []
-    for x in places:
-        for order in range(3):
-            factors = [np.prod([k - j for j in range(order)]) if k >= order else 0.0 for k in range(degree)]
-            rows.append([f * x ** max(k - order, 0) for k, f in enumerate(factors)])
+    powers = range(3 * len(places))
+    rows = [[perm(k, order) * x ** max(k - order, 0) for k in powers] for x in places for order in range(3)]
     return np.array(rows, dtype=float)

@@ -205,7 +205,7 @@ def _branch_choices(setup: PreparedMechanism, z: Array) -> str:
     from planar.solving.continuation.bifurcation import bifurcation_at_start
     from planar.solving.continuation.solution_curve import SolutionCurve
 
-    found = bifurcation_at_start(SolutionCurve(setup, setup.inputs.p, setup.inputs.u, np.ones(1)), np.append(z, 0.0))
+    found = bifurcation_at_start(SolutionCurve(setup, setup.inputs.u, np.ones(1)), np.append(z, 0.0))
     if found is None or len(found.branches) < 2:
         return ""
     columns = list(setup.equations.unknowns)

@@ -32,14 +32,14 @@ class Freedom(NamedTuple):
 def freedom_by_rank(setup: PreparedMechanism, motion: EquationRates) -> Freedom:
     """The freedom at a position by rank."""
     inputs = setup.inputs.u.size
-    found_weak = regularity(setup, motion.jacobian) < MIN_REGULARITY
-    weak = tuple(block for block, is_weak in zip(setup.equations.blocks, found_weak, strict=True) if is_weak)
+    is_block_weak = regularity(setup, motion.jacobian) < MIN_REGULARITY
+    weak = tuple(block for block, is_weak in zip(setup.equations.blocks, is_block_weak, strict=True) if is_weak)
     if not weak:
         # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
         return Freedom(inputs - _contradiction_rank(motion), ())
-    whole = np.hstack([motion.jacobian, motion.input_jacobian])
-    held = rank(_scaled_jacobian(setup, whole), MIN_REGULARITY, unit=1.0)
-    return Freedom(len(setup.equations.unknowns) + inputs - held, weak)
+    jacobian = np.hstack([motion.jacobian, motion.input_jacobian])
+    total_rank = rank(_scaled_jacobian(setup, jacobian), MIN_REGULARITY, unit=1.0)
+    return Freedom(len(setup.equations.unknowns) + inputs - total_rank, weak)
 
 
 def _contradiction_rank(motion: EquationRates) -> int:
@@ -48,8 +48,8 @@ def _contradiction_rank(motion: EquationRates) -> int:
         return 0
     sizes = np.maximum(np.linalg.norm(motion.input_jacobian, axis=0), ZERO_REGULARITY)
     rates = np.linalg.lstsq(motion.jacobian, motion.input_jacobian, rcond=1e-12)[0]
-    left = (motion.input_jacobian - motion.jacobian @ rates) / sizes
-    return int(np.sum(np.linalg.svd(left, compute_uv=False) > MIN_REGULARITY))
+    residual = (motion.input_jacobian - motion.jacobian @ rates) / sizes
+    return int(np.sum(np.linalg.svd(residual, compute_uv=False) > MIN_REGULARITY))
 
 
 def regularity(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
@@ -60,9 +60,9 @@ def regularity(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Ar
     """
     least_values = []
     for stage in setup.equations.blocks:
-        own = jacobian[..., stage.rows, stage.unknowns] / setup.row_scale[stage.rows, None]
-        sizes = np.maximum(np.linalg.norm(own, axis=-2), setup.min_column_scale[stage.unknowns])
-        least_values.append(_least_singular_value(own / sizes[..., None, :]))
+        block_jacobian = jacobian[..., stage.rows, stage.unknowns] / setup.row_scale[stage.rows, None]
+        sizes = np.maximum(np.linalg.norm(block_jacobian, axis=-2), setup.min_column_scale[stage.unknowns])
+        least_values.append(_least_singular_value(block_jacobian / sizes[..., None, :]))
     return np.stack(least_values, axis=-1) if least_values else np.zeros((*jacobian.shape[:-2], 0))
 
 
@@ -78,23 +78,23 @@ def _least_singular_value(block_jacobian: Array) -> Array:
 def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
     """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
 
-    The size of an unknown's column is that in its own block, whatever large or small things later blocks hang on it.
-    A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
+    The size of an unknown's column is that in its own block, however large or small the things that hang on it are. A
+    column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     jacobian = np.asarray(jacobian)
     scaled = jacobian / setup.row_scale[:, None]
     sizes = np.maximum(np.linalg.norm(jacobian, axis=-2), 1.0)
     for stage in setup.equations.blocks:
-        own = np.linalg.norm(scaled[..., stage.rows, stage.unknowns], axis=-2)
-        sizes[..., stage.unknowns] = np.maximum(own, setup.min_column_scale[stage.unknowns])
+        norms = np.linalg.norm(scaled[..., stage.rows, stage.unknowns], axis=-2)
+        sizes[..., stage.unknowns] = np.maximum(norms, setup.min_column_scale[stage.unknowns])
     return scaled / sizes[..., None, :]
 
 
 def input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
     """Whether rates of the inputs that are more than the freedom do not contradict one another."""
-    left = motion.F1 - motion.jacobian @ solve_vectors(motion.jacobian, motion.F1)
+    residual = motion.F1 - motion.jacobian @ solve_vectors(motion.jacobian, motion.F1)
     scale = np.max(np.abs(setup.inputs.u1), initial=0.0) or 1.0
-    return bool(np.max(np.abs(left), initial=0.0) <= 1e-9 * scale)
+    return bool(np.max(np.abs(residual), initial=0.0) <= 1e-9 * scale)
 
 
 def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
@@ -103,7 +103,7 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
     for seed in range(3):
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, u.size)
-        moved = correct_blocks(
+        beside = correct_blocks(
             setup.functions,
             p,
             z + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, z.size),
@@ -111,8 +111,8 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
             stage.block_index,
         )
         if (
-            moved is not None
-            and regularity(setup, jacobian_at(setup, moved, near))[stage.block_index] > ZERO_REGULARITY
+            beside is not None
+            and regularity(setup, jacobian_at(setup, beside, near))[stage.block_index] > ZERO_REGULARITY
         ):
             return False
     return True
@@ -120,8 +120,8 @@ def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool
 
 def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array | SparseMatrices:
     """dF/dz (rows, unknowns) at unknowns z and inputs u."""
-    found: Array | SparseMatrices = setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
-    return found
+    jacobian: Array | SparseMatrices = setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
+    return jacobian
 
 
 def links_free_at_rest(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> list[str]:
@@ -133,10 +133,10 @@ def links_free_at_rest(setup: PreparedMechanism, jacobian: Array | SparseMatrice
 def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
     """The links that rates of the unknowns (unknowns,) move."""
     share = np.abs(rates)
-    moved = [
+    owners = [
         setup.equations.coordinates[column].owner
         for column, part in zip(setup.equations.unknowns, share, strict=True)
         if part > 1e-3 * share.max()
     ]
-    joined = [link for name in moved for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
+    joined = [link for name in owners for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
     return [link for link in dict.fromkeys(joined) if link != setup.mechanism.frame]

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer
 from planar.foundation.jets import value_and_rates
-from planar.model.pairs import MeasureKind
+from planar.model.mechanism import Input
 from planar.results.motion import Motion
 from planar.results.records import Limit
-from planar.solving.continuation.fast_path import FastSamples
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.path_pieces import BranchRates
+from planar.solving.continuation.run_samples import InputRates, RunSamples, join_runs
 from planar.solving.position import PositionSolver, solved_mechanism
-from planar.solving.rates.sample_rates import InputRates
-from planar.solving.runs.samples import RunSamples, build_motion
-from planar.solving.runs.time_run import input_law_rates
+from planar.solving.runs.samples import build_motion
 
 PLACE_TOLERANCE = 1e-12
 """Of a run: places nearer to each other are one."""
@@ -40,7 +36,7 @@ class ContinuousRun:
         self.name = motion.running_input
         self.known = solved_mechanism(motion.mechanism)
         self.solver = self.known.solver
-        self.scale = np.array([_input_scale(self.solver, name) for name in motion.inputs])
+        self.scale = _input_scale(self.solver)
         position = motion.inputs[self.name].position
         steps = np.diff(position)
         self.rows: Array = (
@@ -51,10 +47,15 @@ class ContinuousRun:
         unknowns = None if course is None else course.unknowns
         self.z = run_unknowns(self.solver, motion) if unknowns is None else unknowns[: len(motion)]
         singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
-        self._is_sound: BoolArray = rows_with_rates(motion)
+        has_rates = rows_with_rates(motion)
+        self.is_regular = bool(has_rates.all()) and self.high > self.low
+        "whether every row has rates, so that no dead point or unsolved row is on the way"
+        self._is_sound: BoolArray = has_rates.copy()
         self._is_sound[singular] = False
         forks = () if course is None or motion.time is not None else course.fork_positions
         self.forks = self._places_of_positions(forks)
+        self._seams: Array = np.sort(np.concatenate([self.forks, self.rows[~has_rates]]))
+        "where the path does not go on smoothly"
 
     @property
     def low(self) -> float:
@@ -66,11 +67,6 @@ class ContinuousRun:
         """The last place."""
         return float(self.rows[-1])
 
-    @property
-    def is_regular(self) -> bool:
-        """Whether every row has rates, so that no dead point or unsolved row is on the way."""
-        return bool(rows_with_rates(self.motion).all()) and self.high > self.low
-
     def positions(self, places: Array) -> Array:
         """The position of the running input at places (n,), rad or m."""
         return self._input_rates(np.asarray(places)).u[:, self._running] * self.scale[self._running]
@@ -81,33 +77,17 @@ class ContinuousRun:
         order = np.argsort(places, kind="stable")
         back = np.argsort(order, kind="stable")
         targets = places[order]
-        parts = [self._follow(part) for part in self._divided(targets) if len(part)]
-        samples = [part.fast_samples for part in parts]
-        fast = (
-            FastSamples(
-                np.concatenate([part.coordinate_rates for part in samples if part]),
-                np.concatenate([part.is_sure for part in samples if part]),
-                max(part.residual for part in samples if part),
-            )
-            if all(samples)
-            else None
-        )
-        z = np.vstack([part.z for part in parts])[back]
-        if fast is not None:
-            fast = FastSamples(fast.coordinate_rates[back], fast.is_sure[back], fast.residual)
-        local: dict[int, BranchRates] = {}
-        first = 0
-        for part in parts:
-            local |= {int(back[first + row]): rates for row, rates in part.branch_rates.items()}
-            first += len(part.z)
-        run = RunSamples(z, self._input_rates(places), branch_rates=local, fast_samples=fast)
+        run = join_runs([self._follow(part) for part in self._divided(targets) if len(part)]).select(back)
+        run = run._replace(inputs=self._input_rates(places), passed=(), nearby=())
         time = None if self.motion.time is None else places
         forks = () if self.motion.course is None else self.motion.course.fork_positions
-        path = _PathAtPlaces(frozenset(local), forks, z, self.motion)
-        motion = build_motion(self.solver, self.known.remarks, run, False, path, time)
+        motion = build_motion(self.solver, self.known.remarks, run, False, time, self._limits, forks)
         if len(motion) < len(places):  # a pair that may stay open does so by too much
             raise NoAnswer(motion.outcome, motion.reason)
         return motion
+
+    def _limits(self, motion: Motion) -> tuple[Limit, ...]:
+        return () if self.motion.course is None else self.motion.course.limits(self.motion)
 
     def breaks(self) -> Array:
         """Places inside the run at which the file says that something may bend or jump, and forks of the path."""
@@ -156,7 +136,7 @@ class ContinuousRun:
         if not brackets:
             return np.zeros(0)
         a, b, fa, fb, target = np.array(brackets).T
-        return self.distinct(self._refine(signal, (a, b), (fa, fb), target))
+        return self.distinct(self.roots(signal, (a, b), (fa, fb), target))
 
     def distinct(self, places: Iterable[float]) -> Array:
         """Places inside the run in their order, those that differ by rounding once."""
@@ -164,30 +144,31 @@ class ContinuousRun:
         inside = np.sort([place for place in places if self.low + room < place < self.high - room])
         return inside[np.diff(inside, prepend=-np.inf) > room] if len(inside) else inside
 
-    def _refine(
+    def roots(
         self, signal: Callable[[Motion], Array], ends: tuple[Array, Array], values: tuple[Array, Array], target: Array
     ) -> Array:
-        """Roots in brackets, all at once: false position with the weights of Anderson and Bjorck, else bisection."""
-        a, b, fa, fb = (part.copy() for part in (*ends, *values))
-        room = 1e-15 * max(abs(self.low), abs(self.high))
-        for step in range(MAX_ROOT_STEPS):
-            is_open = (np.abs(b - a) > room) & (fa != 0.0) & (fb != 0.0)
-            if not is_open.any():
+        """Where a signal reaches its targets between two places at which its distances from them are known and differ
+        in sign, all at once, by the method of `root_finding.find_root`."""
+        (b, a), (fb, fa) = (tuple(part.copy() for part in pair) for pair in (ends, values))
+        room, part, is_open = 1e-15 * max(abs(self.low), abs(self.high)), np.full(len(a), 0.5), fa * fb < 0.0
+        for _ in range(MAX_ROOT_STEPS):
+            k = np.flatnonzero(is_open)
+            if not k.size:
                 break
+            x = a[k] + part[k] * (b[k] - a[k])
+            f = np.asarray(signal(self.motion_at(x)), dtype=float) - target[k]
+            stays = f * fa[k] > 0.0
+            c, fc = np.where(stays, a[k], b[k]), np.where(stays, fa[k], fb[k])
+            b[k], fb[k] = np.where(stays, b[k], a[k]), np.where(stays, fb[k], fa[k])
+            a[k], fa[k] = x, f
             with np.errstate(invalid="ignore", divide="ignore"):
-                middle = b - fb * (b - a) / (fb - fa)
-            half = 0.5 * (a + b)
-            middle = np.where(np.isfinite(middle) & (step % 3 < 2), middle, half)
-            middle = np.clip(middle, np.minimum(a, b), np.maximum(a, b))
-            f = np.asarray(signal(self.motion_at(middle[is_open])), dtype=float) - target[is_open]
-            for k, value in zip(np.flatnonzero(is_open), f, strict=True):
-                if value * fb[k] < 0.0:
-                    a[k], fa[k] = b[k], fb[k]
-                else:
-                    weight = 1.0 - value / fb[k]
-                    fa[k] *= weight if weight > 0.0 else 0.5
-                b[k], fb[k] = middle[k], value
-        return np.where(fa == 0.0, a, b)
+                shortest_part = room / np.abs(b[k] - x)
+                xi, phi = (x - b[k]) / (c - b[k]), (f - fb[k]) / (fc - fb[k])
+                inner = f / (fb[k] - f) * fc / (fb[k] - fc) + (c - x) / (b[k] - x) * f / (fc - f) * fb[k] / (fc - fb[k])
+            is_smooth = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
+            part[k] = np.minimum(np.maximum(np.where(is_smooth, inner, 0.5), shortest_part), 1.0 - shortest_part)
+            is_open[k] = (f != 0.0) & (shortest_part <= 0.5)
+        return np.where(np.abs(fa) < np.abs(fb), a, b)
 
     @property
     def _running(self) -> int:
@@ -206,8 +187,7 @@ class ContinuousRun:
     def _input_rates(self, places: Array) -> InputRates:
         motion = self.motion
         if motion.time is not None:
-            parts = np.array([input_law_rates(driven, places) for driven in motion.mechanism.inputs])
-            return InputRates(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
+            return timed_inputs(self.solver, places)
         k = np.clip(np.searchsorted(self.rows, places, side="right") - 1, 0, len(self.rows) - 2)
         along = np.where(np.isin(k, self.turning_rows), k + 1, k)  # a turning row has the rates of the way before it
         inputs = motion.inputs.values()
@@ -221,51 +201,44 @@ class ContinuousRun:
 
     def _divided(self, targets: Array) -> list[Array]:
         """Sorted places, divided where the path does not go on smoothly, and where no others are near."""
-        seams = np.sort([*self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()])
         spacing = (self.high - self.low) / (len(self.rows) - 1)
         gaps = np.flatnonzero(np.diff(targets) > LONGEST_GAP * spacing) + 1
-        return np.split(targets, np.unique([*np.searchsorted(targets, seams), *gaps]).astype(int))
+        return np.split(targets, np.unique([*np.searchsorted(targets, self._seams), *gaps]).astype(int))
 
     def _follow(self, targets: Array) -> RunSamples:
         """The unknowns at sorted places, followed over the rows between them from the nearest sound row."""
-        seams = [self.low - 1.0, *self.forks.tolist(), *self.rows[~rows_with_rates(self.motion)].tolist()]
-        start = max(seam for seam in seams if seam <= targets[0])
-        stop = min((seam for seam in seams if seam >= targets[-1]), default=np.inf)
+        start = np.max(self._seams, initial=-np.inf, where=self._seams <= targets[0])
+        stop = np.min(self._seams, initial=np.inf, where=self._seams >= targets[-1])
         usable = self._is_sound & (self.rows >= start) & (self.rows <= stop)
         usable = usable if usable.any() else self._is_sound
         base = int(np.argmin(np.where(usable, np.abs(self.rows - targets[0]), np.inf)))
         between = self.rows[(self.rows > targets[0]) & (self.rows < targets[-1])]
         places = np.sort(np.concatenate([targets, between]))
         rates = self._input_rates(np.concatenate([[self.rows[base]], places]))
-        path = follow_samples(self.solver, self.solver.inputs.p, self.z[base], rates.u, rates=(rates.u1, rates.u2))
-        if path.stopped is not None:
-            raise path.stopped
-        chosen = 1 + np.searchsorted(places, targets)
-        index = {int(row): k for k, row in enumerate(chosen)}
-        branch_rates = {index[row]: part for row, part in path.branch_rates.items() if row in index}
-        fast = path.fast_samples
-        if fast is not None:
-            fast = FastSamples(fast.coordinate_rates[chosen], fast.is_sure[chosen], fast.residual)
-        target_rates = InputRates(*(part[chosen] for part in rates))
-        return RunSamples(path.z[chosen], target_rates, branch_rates=branch_rates, fast_samples=fast)
+        run = follow_samples(self.solver, self.z[base], rates)
+        if run.stopped is not None:
+            raise run.stopped
+        return run.select(1 + np.searchsorted(places, targets))
 
 
-@dataclass(eq=False)
-class _PathAtPlaces:
-    """The path of a motion at chosen places of another one; see `FollowedPath`."""
-
-    singular_rows: frozenset[int]
-    fork_positions: tuple[float, ...]
-    unknowns: Array
-    source: Motion
-
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
-        """See `Motion.limits`."""
-        return () if self.source.course is None else self.source.course.limits(self.source)
+def timed_inputs(solver: PositionSolver, time: Array) -> InputRates:
+    """The inputs at times (s), each by its law, or at the file's velocity and acceleration."""
+    parts = np.array([input_law_rates(driven, time) for driven in solver.mechanism.inputs])
+    return InputRates(*(part.T / _input_scale(solver) for part in parts.transpose(1, 0, 2)))
 
 
-def _input_scale(solver: PositionSolver, name: str) -> float:
-    return solver.unit if solver.relative_motions[name].input_kind is MeasureKind.LENGTH else 1.0
+def input_law_rates(driven: Input, time: Array) -> Array:
+    """Position and first, second and third rate of an input (4, times)."""
+    if driven.law is not None:
+        return np.asarray(driven.law.evaluate(time, driven.position, driven.velocity))
+    velocity = driven.velocity + driven.acceleration * time
+    position = driven.position + driven.velocity * time + 0.5 * driven.acceleration * time**2
+    return np.array([position, velocity, np.full_like(time, driven.acceleration), np.zeros_like(time)])
+
+
+def _input_scale(solver: PositionSolver) -> Array:
+    """What the inputs of the solver are in units of (inputs,): m or rad."""
+    return np.where(solver.structure.input_slides, solver.unit, 1.0)
 
 
 def _repeated(level: float, period: float, low: float, high: float) -> list[float]:

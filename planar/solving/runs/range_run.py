@@ -2,44 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.time_limit import time_is_over
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Drive, Mechanism, replace_inputs, running_input_index
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
-from planar.solving.continuation.fast_path import FastSamples, fast_run
-from planar.solving.continuation.path import FollowedSamples, PathFollower, follow_samples, follow_to
-from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until
+from planar.results.records import Limit
+from planar.solving.continuation.events import LimitSearch, LocatedLimit, distinct_limits
+from planar.solving.continuation.fast_path import fast_run
+from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
+from planar.solving.continuation.path_pieces import PathPiece, follow_circuit
 from planar.solving.continuation.predictor_corrector import (
+    MAX_ARCS,
     SHOWN_SLIDE_EXTENT,
+    ArcBudget,
+    CurveTracker,
     NearbyBifurcation,
 )
-from planar.solving.diagnosis import refusals
-from planar.solving.position import stopped_at_start
-from planar.solving.rates.regularity import moved_links
-from planar.solving.rates.sample_rates import InputRates
-from planar.solving.runs.closed_circuit import follow_circuit
-from planar.solving.runs.range_limits import STEP_ROUNDING, RangeLimits
-from planar.solving.runs.running_input import RunningInput
-from planar.solving.runs.samples import (
+from planar.solving.continuation.run_samples import (
+    BranchRates,
+    InputRates,
     RunSamples,
-    build_motion,
-    drop_first,
     join_runs,
-    reverse_run,
-    run_samples,
-    splice_runs,
+    resting_inputs,
+    unjudged_rows,
 )
+from planar.solving.diagnosis import refusals
+from planar.solving.position import solved_mechanism, stopped_at_start
+from planar.solving.rates.regularity import moved_links
+from planar.solving.runs.samples import build_motion
 
 RANGE_SAMPLES = 73
 """Places of a turn, or of the greatest travel of a slide, between which the range of an input ends."""
 MIN_RANGE = 1e-5
 """rad or sizes: a range shorter than this is none."""
+ARCS_PER_TURN = 100
+"""Arcs by which what may be spent grows with each turn that is asked for, as far as a motion is followed at most."""
+STEP_ROUNDING = 1e-9
+"""Parts of a step: what rounding leaves of one."""
+
+Progress = Callable[[float, float], None]
 
 
 class _RangeEnd(NamedTuple):
@@ -54,259 +63,335 @@ class _RangeEnd(NamedTuple):
     nearby: tuple[NearbyBifurcation, ...] = ()
 
 
-class RangeRun(RunningInput):
-    """The runs of one input while the others stand still."""
+class RangeRun:
+    """The runs of one input while the others stand still.
+
+    `progress(done, total)` is called now and then, in rad or m of the input's way.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        pair: str | None,
+        branches: Sequence[int],
+        with_jerk: bool,
+        progress: Progress | None = None,
+    ):
+        names = [driven.pair for driven in mechanism.inputs]
+        self.index = running_input_index(mechanism, pair)
+        still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
+        self.known = solved_mechanism(replace_inputs(mechanism, still))
+        self.solver = self.known.solver
+        self.pair = names[self.index]
+        self.is_sliding = self.solver.is_sliding(self.pair)
+        self.scale = self.solver.unit if self.is_sliding else 1.0
+        self.u = self.solver.inputs.u
+        self.position = float(self.u[self.index])
+        "the file's own, from which all others are followed"
+        self.branches, self.with_jerk = tuple(branches), with_jerk
+        self.z = self.known.assembly.z
+        self.progress = progress
+        self.current_budget = self.arc_budget(0.0)
+
+    def input_rates(self, positions: Array, senses: Array | float = 1.0) -> InputRates:
+        """The inputs over a run, each row with the file's rates; backwards the velocity turns round."""
+        s, count = self.solver.inputs, len(positions)
+        u1, u2 = (np.repeat(rate[None], count, axis=0) for rate in (s.u1, s.u2))
+        return InputRates(self.inputs_at(positions), u1 * np.reshape(senses, (-1, 1)), u2, np.zeros_like(u1))
+
+    def inputs_at(self, positions: Array | float) -> Array:
+        """The inputs where the one that runs is at a position, or at positions (positions, inputs)."""
+        inputs = np.tile(self.u, (*np.shape(positions), 1))
+        inputs[..., self.index] = positions
+        return inputs
+
+    def arc_budget(self, reach: float, first: float | None = None) -> ArcBudget:
+        """What may be spent on so long a way of the input; reports how far from `first` it has come."""
+        tell = None
+        if self.progress is not None and first is not None:
+            inform, total = self.progress, reach * self.scale
+
+            def tell(u: Array) -> None:
+                inform(min(abs(float(u[self.index]) - first) * self.scale, total), total)
+
+        return ArcBudget(MAX_ARCS + int(ARCS_PER_TURN * min(reach, LARGEST_INPUT_POSITION) / (2.0 * pi)), tell)
+
+    def curve_tracker(
+        self, z: Array, first: float, sense: float = 1.0, budget: ArcBudget | None = None
+    ) -> CurveTracker:
+        """A walk from a position of the input, in the direction in which it goes on."""
+        axis = np.zeros_like(self.u)
+        axis[self.index] = sense
+        return CurveTracker(self.solver, z, self.inputs_at(first), axis, self.branches, budget)
 
     def run_range(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
-        """The run over a range, or over the one that the input has by itself; and back again if wanted."""
-        here = float(self.u[self.index])
+        """The run over a range, or over the one that the input has by itself; and back again if asked for."""
+        run = self._range(steps, start, stop)
+        if back:
+            run = join_runs([run, run.reversed().from_row(1)._replace(passed=(), nearby=())])
+        return self._motion(run)
+
+    def _range(self, steps: int, start: float | None, stop: float | None) -> RunSamples:
         if start is None and stop is None:
-            return self._to_motion(self._whole_range(steps, here), back)
-        first = here if start is None else start / self.scale
+            return self._total_range(steps)
+        first = self.position if start is None else start / self.scale
         if stop is not None or not self.is_sliding:
-            last = first + 2.0 * pi if stop is None else stop / self.scale
-            return self._to_motion(self._run(steps, first, last), back)
-        end = self._range_end(
-            follow_to(self.solver, self.p, self.assembly.z, self.u, self.inputs_at(first)), first, 1.0
-        )
+            return self._run(np.linspace(first, first + 2.0 * pi if stop is None else stop / self.scale, steps + 1))
+        end = self._range_end(follow_to(self.solver, self.z, self.u, self.inputs_at(first)), first, 1.0)
         grid = np.linspace(first, end.position, steps + 1)
-        found = self._follow_positions(grid[:-1])
-        if found.stopped is not None:
-            return self._to_motion(self._with_stop_row(found, self.input_rates(grid)), back)
-        whole = found._replace(
-            z=np.vstack([found.z, end.z]), fast_samples=found.fast_samples and found.fast_samples.padded(0, 1)
-        )
-        dead = (steps,) if end.ending is TrackingEnd.DEAD_POINT else ()
-        return self._to_motion(self._with_range_ends(run_samples(whole, self.input_rates(grid), dead), (end,)), back)
+        run = self._follow_positions(grid[:-1])
+        return self._with_stop_row(run) if run.stopped is not None else self._with_range_ends(run, None, end)
 
     def run_circuit(self, steps: int, start: float | None) -> Motion:
         """The whole circuit of the assembly, through its dead points, back to where it starts."""
-        here = float(self.u[self.index])
-        first = here if start is None else start / self.scale
-        work = self.arc_budget(0.0)
-        walk = self.curve_tracker(
-            follow_to(self.solver, self.p, self.assembly.z, self.u, self.inputs_at(first)), first, work=work
-        )
-        if walk.point.regular_distance < MIN_RANGE and not walk.starts_on_bifurcation:
-            told = "branches of the motion cross where the circuit would start; choose one by its number (`branches`,"
-            raise BadInput("start", told + " --branch), or start it elsewhere")
-        whole = follow_circuit(self.solver, walk)
+        first = self.position if start is None else start / self.scale
+        z = follow_to(self.solver, self.z, self.u, self.inputs_at(first))
+        tracker = self.curve_tracker(z, first, budget=self.arc_budget(0.0))
+        if tracker.point.regular_distance < MIN_RANGE and not tracker.starts_on_bifurcation:
+            problem = "branches of the motion cross where the circuit would start; choose one by its number"
+            raise BadInput("start", f"{problem} (`branches`, --branch), or start it elsewhere")
+        circuit = follow_circuit(tracker)
         turn = np.inf if self.is_sliding else 2.0 * pi
-        spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.branches), turn) / steps
-        z: list[Array] = []
-        places: list[float] = []
-        senses: list[float] = []
-        dead: list[int] = []
-        local: dict[int, BranchRates] = {}
-        for stretch in whole.branches:
-            begin, last = stretch.ends
+        spacing = min(max(abs(branch.ends[1] - branch.ends[0]) for branch in circuit.branches), turn) / steps
+        rows: list[tuple[Array, float, float]] = []
+        branch_rates: dict[int, BranchRates] = {}
+        dead_points = [0] if circuit.starts_at_dead_point else []
+        for branch in circuit.branches:
+            begin, last = branch.ends
             count = max(1, ceil(abs(last - begin) / spacing - STEP_ROUNDING))
-            for place in np.linspace(begin, last, count + 1)[1 if z else 0 :]:
-                known, singular = stretch.unknowns_at(walk.curve, float(place))
-                if singular is not None:
-                    local[len(z)] = singular
-                z.append(known)
-                places.append(first + place)
-                senses.append(1.0 if last > begin else -1.0)
-            dead.append(len(z) - 1)
-        ends = (0, *dead) if whole.starts_at_dead_point else tuple(dead[:-1])
-        given = self.input_rates(np.array(places), np.array(senses))
-        found = RunSamples(np.array(z), given, ends, local, bifurcations_until(walk), tuple(walk.nearby))
-        limits = RangeLimits(self, found, (whole, walk))
-        return build_motion(self.solver, self.known.remarks, found, self.with_jerk, limits)
+            for place in np.linspace(begin, last, count + 1)[1 if rows else 0 :].tolist():
+                z, rates = branch.unknowns_at(tracker.curve, place)
+                if rates is not None:
+                    branch_rates[len(rows)] = rates
+                rows.append((z, first + place, 1.0 if last > begin else -1.0))
+            dead_points.append(len(rows) - 1)
+        z, positions, senses = (np.array(column) for column in zip(*rows, strict=True))
+        run = unjudged_rows(self.solver, z, self.input_rates(positions, senses))._replace(
+            dead_points=tuple(dead_points if circuit.starts_at_dead_point else dead_points[:-1]),
+            branch_rates=branch_rates,
+            passed=tracker.passed_until(),
+            nearby=tuple(tracker.nearby),
+        )
+        return self._motion(run, (circuit.pieces, tracker))
 
-    def _to_motion(self, found: RunSamples, back: bool) -> Motion:
-        if back:
-            found = join_runs(found, reverse_run(found)._replace(passed=(), nearby=()))
-        return build_motion(self.solver, self.known.remarks, found, self.with_jerk, RangeLimits(self, found, None))
+    def _motion(self, run: RunSamples, circuit: tuple[tuple[PathPiece, ...], CurveTracker] | None = None) -> Motion:
+        """The motion of a run, or of a circuit of pieces that were walked along."""
+        forks = tuple(float(passed.u[self.index]) * self.scale for passed in run.passed if passed.is_switched)
+        positions = run.inputs.u[:, self.index]
 
-    def _run(self, steps: int, first: float, last: float) -> RunSamples:
-        grid = np.linspace(first, last, steps + 1)
-        given = self.input_rates(grid)
-        self.current_budget = self.arc_budget(abs(last - first) + abs(first - float(self.u[self.index])), first)
-        found = self._follow_positions(grid)
-        return run_samples(found, given) if found.stopped is None else self._with_stop_row(found, given)
+        def find_limits(_: Motion) -> tuple[Limit, ...]:
+            if len(positions) < 2:
+                return ()
+            if circuit is None:
+                return self._range_limits(positions)
+            pieces, tracker = circuit
+            search = LimitSearch(self.pair, float(positions[0]), 1.0, tracker)
+            return distinct_limits(self.pair, tracker.curve, search.along(pieces))
 
-    def _follow_positions(self, grid: Array) -> FollowedSamples:
+        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, None, find_limits, forks)
+
+    def _range_limits(self, positions: Array) -> tuple[Limit, ...]:
+        """The limits between the first row and the last, from where the rows were followed from, so that the same ways
+        are taken at change points."""
+        is_there_and_back = len(positions) > 2 and positions[0] == positions[-1] and positions[1] == positions[-2]
+        last = float(positions[(len(positions) - 1) // 2 if is_there_and_back else -1])
+        first, sense = float(positions[0]), 1.0 if last >= positions[0] else -1.0
+        down, up = self._limits_until(first, -sense), self._limits_until(last, sense)
+        low, high = sorted((first * self.scale, last * self.scale))
+        room = STEP_ROUNDING * self.scale
+        between = [located for located in (*down[::-1], *up) if low - room <= located.limit.input <= high + room]
+        return distinct_limits(self.pair, self.curve_tracker(self.z, self.position).curve, between)
+
+    def _limits_until(self, last: float, sense: float) -> list[LocatedLimit]:
+        """The limits from the file's position to another one, if it lies that way; at the file's position its stops."""
+        reach = sense * (last - self.position)
+        if reach < -STEP_ROUNDING or (reach <= 0.0 and self.solver.stops is None):
+            return []
+        reach = max(reach, 0.0)
+        tracker = self.curve_tracker(self.z, self.position, sense, self.arc_budget(reach, self.position))
+        # all with the input on its way up, whichever way it was followed
+        search = LimitSearch(self.pair, self.position, sense, tracker)
+        return [located.in_direction(sense) for located in search.until(reach)]
+
+    def _run(self, grid: Array) -> RunSamples:
+        first, last = float(grid[0]), float(grid[-1])
+        self.current_budget = self.arc_budget(abs(last - first) + abs(first - self.position), first)
+        run = self._follow_positions(grid)
+        return run if run.stopped is None else self._with_stop_row(run)
+
+    def _follow_positions(self, grid: Array) -> RunSamples:
         """The run through places of the input in their order, followed from the file's own position.
 
         Raises NoAnswer where it does not come to the first of them.
         """
-        here = float(self.u[self.index])
         sense = 1.0 if grid[-1] >= grid[0] else -1.0
-        before = sense * grid < sense * here
-        if not before.any():
-            found = self._follow_from_file(grid)
-            if len(found.z) < 2 and found.stopped is not None:
-                raise self._stop_reason(found, found.stopped)
-            return drop_first(found)
-        down = self._follow_from_file(grid[before][::-1])
-        if down.stopped is not None:
-            raise self._stop_reason(down, down.stopped)
-        return splice_runs(down, self._follow_from_file(grid[~before]))
+        is_before = sense * grid < sense * self.position
+        if not is_before.any():
+            return self._rows(self._follow_from_file(grid))
+        back = self._follow_from_file(grid[is_before][::-1])
+        if back.stopped is not None:
+            raise self._start_problem(back, back.stopped)
+        return _spliced(back, self._follow_from_file(grid[~is_before]))
 
-    def _stop_reason(self, found: FollowedSamples, problem: NoAnswer) -> NoAnswer:
+    def _start_problem(self, run: RunSamples, problem: NoAnswer) -> NoAnswer:
         """What to say of a run that stopped: of one that did not start, if it is a change point that it stands on."""
-        return stopped_at_start(self.solver, self.assembly.z, problem) if len(found.z) < 2 else problem
+        return stopped_at_start(self.solver, self.z, problem) if len(run.z) < 2 else problem
 
-    def _follow_from_file(self, grid: Array) -> FollowedSamples:
-        here = self.u[self.index]
-        given = self.input_rates(np.append(here, grid))
-        rates = None if self.with_jerk else (given.u1, given.u2)
-        return follow_samples(self.solver, self.p, self.assembly.z, given.u, self.branches, rates, self.current_budget)
+    def _rows(self, run: RunSamples) -> RunSamples:
+        """A run without its first position, which is no row. Raises NoAnswer where there is no other."""
+        if len(run.z) < 2 and run.stopped is not None:
+            raise self._start_problem(run, run.stopped)
+        return run.from_row(1)
 
-    def _whole_range(self, steps: int, here: float) -> RunSamples:
+    def _follow_from_file(self, grid: Array) -> RunSamples:
+        inputs = self.input_rates(np.append(self.position, grid))
+        return follow_samples(self.solver, self.z, inputs, self.branches, self.current_budget)
+
+    def _total_range(self, steps: int) -> RunSamples:
         """One turn on where the input makes it, else all between its limits."""
         key = self.index, self.branches
         ends = self.known.range_ends.get(key)
         if ends is None:
-            turn = None if self.is_sliding else self._one_turn(steps, here)
+            turn = None if self.is_sliding else self._one_turn(steps)
             if isinstance(turn, RunSamples):
                 return turn
-            high = turn or self._range_end(self.assembly.z, here, 1.0)
-            ends = self._range_end(self.assembly.z, here, -1.0), high
+            high = turn or self._range_end(self.z, self.position, 1.0)
+            ends = self._range_end(self.z, self.position, -1.0), high
             if not time_is_over():
                 self.known.range_ends[key] = ends
         low, high = ends
         if high.position - low.position < MIN_RANGE:
-            if TrackingEnd.INTERRUPTED in (low.ending, high.ending):
-                raise refusals.motion_ended(
-                    self.solver, (), self.solver.describe_input(self.pair, here), TrackingEnd.INTERRUPTED
-                )
-            self.solver.state(self.assembly.z)  # says why nothing goes on from a dead point or a change point
-            at = self.solver.describe_input(self.pair, here)
-            told = f"the input at {self.pair!r} can all but not move from {at}, as its motion ends close by both ways"
-            raise NoAnswer(Outcome.DEAD_POINT, f"{told}; change a dimension, or drive another pair")
+            self._refuse_short_range(low, high)
         # from within to the limits: from a limit two branches lead inwards
         grid = np.linspace(low.position, high.position, steps + 1)
         inner = grid[1:-1]
-        found = self._quick_run(inner, here)
-        if found is None:
-            below, above = inner[inner < here][::-1], inner[inner >= here]
-            down, up = self._follow_from_file(below), self._follow_from_file(above)
-            for part, places in ((down, below), (up, above)):
-                if part.stopped is not None and len(part.z) < 2:
-                    raise self._stop_reason(part, part.stopped)
+        run = self._quick_run(inner)
+        if run is None:
+            is_below = inner < self.position
+            down, up = (self._follow_from_file(places) for places in (inner[is_below][::-1], inner[~is_below]))
+            for part in (down, up):
                 if part.stopped is not None:
-                    return self._with_stop_row(drop_first(part), self.input_rates(places[: len(part.z)]))
-            found = splice_runs(down, up)
-        local = {row + 1: each for row, each in found.branch_rates.items()}
-        known = found.fast_samples and found.fast_samples.padded(1, 1)
-        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), branch_rates=local, fast_samples=known)
-        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.ending is TrackingEnd.DEAD_POINT)
-        return self._with_range_ends(run_samples(whole, self.input_rates(grid), dead), (low, high))
+                    return self._with_stop_row(self._rows(part))
+            run = _spliced(down, up)
+        return self._with_range_ends(run, low, high)
 
-    def _quick_run(self, places: Array, here: float) -> FollowedSamples | None:
+    def _refuse_short_range(self, low: _RangeEnd, high: _RangeEnd) -> None:
+        """Raise NoAnswer for a range whose ends are all but one."""
+        place = self.solver.describe_input(self.pair, self.position)
+        if TrackingEnd.INTERRUPTED in (low.ending, high.ending):
+            raise refusals.motion_ended(self.solver, (), place, TrackingEnd.INTERRUPTED)
+        self.solver.state(self.z)  # says why nothing goes on from a dead point or a change point
+        problem = f"the input at {self.pair!r} can all but not move from {place}, as its motion ends close by both ways"
+        raise NoAnswer(Outcome.DEAD_POINT, f"{problem}; change a dimension, or drive another pair")
+
+    def _quick_run(self, places: Array) -> RunSamples | None:
         """A run through places on both sides of the file's own position, if all of it is surely sound."""
-        at = int(np.searchsorted(places, here))
-        sure = fast_run(self.solver, self.assembly.z, *self.input_rates(np.insert(places, at, here))[:3], at)
-        if sure is None or len(sure.z) <= len(places):
+        start = int(np.searchsorted(places, self.position))
+        run = fast_run(self.solver, self.z, self.input_rates(np.insert(places, start, self.position)), start)
+        if run is None or len(run.z) <= len(places):
             return None
-        rows = np.arange(len(sure.z)) != at
-        samples = FastSamples(sure.coordinate_rates[rows], sure.is_sure[rows], sure.residual)
-        return FollowedSamples(sure.z[rows], 0, fast_samples=None if self.with_jerk else samples)
+        return run.select(np.delete(np.arange(len(run.z)), start))
 
-    def _one_turn(self, steps: int, here: float) -> RunSamples | _RangeEnd | None:
+    def _one_turn(self, steps: int) -> RunSamples | _RangeEnd | None:
         """One turn on, if the input makes it; else the end of its range, if that is known."""
-        places = np.linspace(here, here + 2.0 * pi, steps + 1)
-        given = self.input_rates(places)
-        sure = fast_run(self.solver, self.assembly.z, *given[:3])
-        if sure is not None and len(sure.z) == steps + 1 and sure.is_sure.all() and not self.with_jerk:
-            return RunSamples(
-                sure.z, given, fast_samples=FastSamples(sure.coordinate_rates, sure.is_sure, sure.residual)
-            )
-        if sure is not None and len(sure.z) <= steps:
+        places = np.linspace(self.position, self.position + 2.0 * pi, steps + 1)
+        quick = fast_run(self.solver, self.z, self.input_rates(places))
+        if quick is not None and len(quick.z) == steps + 1 and quick.is_sure.all():
+            return quick
+        if quick is not None and len(quick.z) <= steps:
             # walking tells it sooner than a run would
             end = (
-                self._end_beyond(sure.z, places)
-                if self.solver.functions.is_sparse and len(sure.z)
-                else self._find_range_end(self.assembly.z, here, 1.0, 2.0 * pi)
+                self._end_beyond(quick.z, places)
+                if self.solver.functions.is_sparse and len(quick.z)
+                else self._find_range_end(self.z, self.position, 1.0, 2.0 * pi)
             )
             if end.ending is not None:
                 return end
-        found = self._run(steps, here, here + 2.0 * pi)
-        return found if found.outcome in (Outcome.SOLVED, Outcome.INTERRUPTED) else None
+        run = self._run(places)
+        return run if run.outcome in (Outcome.SOLVED, Outcome.INTERRUPTED) else None
 
-    def _with_range_ends(self, found: RunSamples, ends: tuple[_RangeEnd, ...]) -> RunSamples:
-        """Rows of a range that ends by itself, with what there is to say of its ends."""
-        if found.outcome is not Outcome.SOLVED:
-            return found
+    def _with_range_ends(self, run: RunSamples, low: _RangeEnd | None, high: _RangeEnd) -> RunSamples:
+        """The rows between the ends of a range with those at the ends, and what there is to say of these; without the
+        lower one the range does not start there by itself."""
+        ends = [end for end in (low, high) if end is not None]
+        parts = [
+            unjudged_rows(self.solver, end.z[None], self.input_rates(np.array([end.position])))._replace(
+                dead_points=(0,) if end.ending is TrackingEnd.DEAD_POINT else ()
+            )
+            for end in ends
+        ]
+        run = join_runs([*parts[:-1], run, parts[-1]])
         reasons = []
         for ending in dict.fromkeys(end.ending for end in ends):
             alike = [end for end in ends if end.ending is ending]
-            where = join_all_names(
-                [self.solver.describe_input(self.pair, float(end.limit[self.index])) for end in alike]
-            )
+            positions = [self.solver.describe_input(self.pair, float(end.limit[self.index])) for end in alike]
+            last_rows = [self.solver.describe_input(self.pair, end.position) for end in alike]
+            where = join_all_names(positions)
             if ending is TrackingEnd.DEAD_POINT:
                 reasons.append(f"the range of {self.pair!r} ends at {where}")
             elif ending is TrackingEnd.STOP and self.solver.stops is not None:
-                for end in alike:
-                    where = self.solver.describe_input(self.pair, end.position)
+                for end, place in zip(alike, last_rows, strict=True):
                     met = self.solver.stops.describe_met(self.solver.stop_positions(end.z, end.limit))
-                    reasons.append(f"the range of {self.pair!r} ends at {where}, where {met}")
+                    reasons.append(f"the range of {self.pair!r} ends at {place}, where {met}")
             elif ending is not None:
                 links = list(dict.fromkeys(link for end in alike for link in end.links))
                 problem = refusals.motion_ended(self.solver, links, where, ending)
-                found = found.with_problem(problem)
+                run = run._replace(stopped=problem)
                 reasons.append(problem.reason)
             if ending is TrackingEnd.ENDLESS:
-                last = join_all_names([self.solver.describe_input(self.pair, end.position) for end in alike])
-                reasons.append(f"the rows go as far as {last}")
-        dead = tuple(row % len(found.z) for row in found.dead_points)
-        missed = (*found.nearby, *(each for end in ends for each in end.nearby))
-        return found._replace(dead_points=dead, nearby=missed, reason="; ".join(reasons))
+                reasons.append(f"the rows go as far as {join_all_names(last_rows)}")
+        nearby = (*run.nearby, *(near for end in ends for near in end.nearby))
+        return run._replace(nearby=nearby, reason="; ".join(reasons))
 
-    def _with_stop_row(self, found: FollowedSamples, given: InputRates) -> RunSamples:
+    def _with_stop_row(self, run: RunSamples) -> RunSamples:
         """A run that did not come to its end, with a last row where it stopped."""
-        reached = run_samples(found, given)
-        if found.last_position is None or found.stopped is None:
-            return reached.with_problem(found.stopped)
-        z, u = found.last_position
-        ends_there = InputRates(u[None], *(each[-1:] for each in reached.inputs[1:]))
-        if np.max(np.abs(u - reached.inputs.u[-1]), initial=0.0) == 0.0:
-            dead = (len(reached.z) - 1,) if found.stopped.outcome is Outcome.DEAD_POINT else ()
-            return reached._replace(dead_points=dead).with_problem(found.stopped)
-        reached = reached._replace(
-            z=np.vstack([reached.z, z]),
-            inputs=InputRates(*(np.vstack(both) for both in zip(reached.inputs, ends_there, strict=True))),
-            dead_points=(len(reached.z),),
-            fast_samples=reached.fast_samples and reached.fast_samples.padded(0, 1),
-        )
-        return reached.with_problem(found.stopped)
+        if run.last_position is None or run.stopped is None:
+            return run
+        z, u = run.last_position
+        if np.max(np.abs(u - run.inputs.u[-1]), initial=0.0) == 0.0:
+            is_dead_point = run.stopped.outcome is Outcome.DEAD_POINT
+            return run._replace(dead_points=(len(run.z) - 1,) if is_dead_point else ())
+        return run.with_last_row(z, InputRates(u[None], *(rate[-1:] for rate in run.inputs[1:])), True)
 
-    def _range_end(self, z: Array, here: float, sign: float) -> _RangeEnd:
+    def _range_end(self, z: Array, first: float, sense: float) -> _RangeEnd:
         """Where the range of the input ends, one way from a position with unknowns z.
 
         Steps along a curve of many unknowns are short: it is followed only where samples are not surely sound.
         """
-        far = SHOWN_SLIDE_EXTENT if self.is_sliding else 2.0 * pi
+        reach = SHOWN_SLIDE_EXTENT if self.is_sliding else 2.0 * pi
         if self.solver.functions.is_sparse:
-            places = here + sign * np.linspace(0.0, far, RANGE_SAMPLES)
-            u = np.array([self.inputs_at(place) for place in places])
-            found = fast_run(self.solver, z, u, np.zeros_like(u), np.zeros_like(u))
-            if found is not None and len(found.z):
-                return self._end_beyond(found.z, places)
-        return self._find_range_end(z, here, sign, far)
+            places = first + sense * np.linspace(0.0, reach, RANGE_SAMPLES)
+            quick = fast_run(self.solver, z, resting_inputs(self.inputs_at(places)))
+            if quick is not None and len(quick.z):
+                return self._end_beyond(quick.z, places)
+        return self._find_range_end(z, first, sense, reach)
 
     def _end_beyond(self, samples: Array, places: Array) -> _RangeEnd:
         """The same beyond samples (samples, unknowns) that are surely sound, the first at some places of the input."""
         last = max(len(samples) - 2, 0)
-        far = float(places[-1] - places[last])
-        return self._find_range_end(samples[last], float(places[last]), 1.0 if far > 0.0 else -1.0, abs(far))
+        reach = float(places[-1] - places[last])
+        return self._find_range_end(samples[last], float(places[last]), 1.0 if reach > 0.0 else -1.0, abs(reach))
 
-    def _find_range_end(self, z: Array, here: float, sign: float, far: float) -> _RangeEnd:
+    def _find_range_end(self, z: Array, first: float, sense: float, reach: float) -> _RangeEnd:
         """The same by following the curve so far."""
-        start = self.inputs_at(here)
-        trip = PathFollower(
-            self.solver, self.p, z, start, self.inputs_at(here + sign) - start, self.branches, self.arc_budget(0.0)
-        )
-        found = trip.unknowns_at(far)
-        if found is not None:
+        start = self.inputs_at(first)
+        direction = self.inputs_at(first + sense) - start
+        follower = PathFollower(self.solver, z, start, direction, self.branches, self.arc_budget(0.0))
+        last = first + sense * reach
+        end = follower.unknowns_at(reach)
+        if end is not None:
             if self.is_sliding:
-                told = "the slide goes on without a limit; name where the range starts and stops"
-                raise BadInput(self.pair, told)
-            return _RangeEnd(found[0], here + sign * far, None, self.inputs_at(here + sign * far))
-        limit, ending = trip.end_inputs
-        last, u = trip.last_position or (z, start)
-        links = tuple(moved_links(self.solver, trip.point.tangent[:-1]))
-        return _RangeEnd(last, float(u[self.index]), ending, limit, links, tuple(trip.tracker.nearby))
+                problem = "the slide goes on without a limit; name where the range starts and stops"
+                raise BadInput(self.pair, problem)
+            return _RangeEnd(end[0], last, None, self.inputs_at(last))
+        limit, ending = follower.end_inputs
+        z, u = follower.last_position or (z, start)
+        links = tuple(moved_links(self.solver, follower.point.tangent[:-1]))
+        return _RangeEnd(z, float(u[self.index]), ending, limit, links, tuple(follower.tracker.nearby))
+
+
+def _spliced(back: RunSamples, ahead: RunSamples) -> RunSamples:
+    """Two runs from one position, which is no row, as one through it: the first backwards, then the second."""
+    backwards: IntArray = np.arange(len(back.z) - 1, 0, -1)
+    first = back.select(backwards)._replace(passed=back.passed[::-1])
+    return join_runs([first, ahead.from_row(1)])

@@ -3,193 +3,151 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
-from planar.foundation.jets import Jet, value_and_rates
+from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
-from planar.model.mechanism import Input, Mechanism
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair
 from planar.results.motion import Motion
 from planar.results.records import Limit
-from planar.solving.continuation.change_point_remarks import change_point_remark
-from planar.solving.continuation.events import STANDING_RATE, WatchedOutputs, watched_outputs
-from planar.solving.continuation.path import FollowedSamples, follow_samples, follow_straight
-from planar.solving.continuation.path_pieces import END_TOLERANCE, PathBifurcation
-from planar.solving.position import solved_mechanism, stopped_at_start
-from planar.solving.rates.sample_rates import InputRates, sample_rates
-from planar.solving.runs.samples import RunSamples, build_motion, run_samples
+from planar.solving.continuation.events import STANDING_RATE, change_point_remark, watched_outputs
+from planar.solving.continuation.path import follow_samples
+from planar.solving.continuation.predictor_corrector import END_TOLERANCE, PassedBifurcation
+from planar.solving.continuation.run_samples import RunSamples
+from planar.solving.position import PositionSolver, solved_mechanism, stopped_at_start
+from planar.solving.runs.continuous_run import ContinuousRun, timed_inputs
+from planar.solving.runs.samples import build_motion
 
 
-class TimeRun:
-    """All inputs of a mechanism at once, in time."""
-
-    def __init__(self, mechanism: Mechanism, branches: Sequence[int], third: bool):
-        self.known = solved_mechanism(mechanism)
-        self.solver = self.known.solver
-        self.branches, self.with_jerk = tuple(branches), third
-        self.scale = np.array([self.solver.unit if self.solver.is_sliding(g.pair) else 1.0 for g in mechanism.inputs])
-        self.assembly = self.known.assembly
-
-    def run(self, steps: int, duration: float | None) -> Motion:
-        """The run from the start of the laws to the end of the longest, or for a duration (s)."""
-        laws = [given.law.duration for given in self.solver.mechanism.inputs if given.law is not None]
-        if duration is None:
-            if not laws:
-                raise BadInput("duration", "no input has a law; say for how long (s) they run")
-            duration = max(laws)
-        time = np.linspace(0.0, duration, steps + 1)
-        given = self.input_rates(time)
-        known = None if self.with_jerk else (given.u1, given.u2)
-        found = follow_samples(self.solver, self.solver.inputs.p, self.assembly.z, given.u, self.branches, known)
-        if found.stopped is not None and len(found.z) < 2:
-            problem = stopped_at_start(self.solver, self.assembly.z, found.stopped)
-            if problem is not found.stopped:
-                raise problem
-        told = run_samples(found, given).with_problem(found.stopped)
-        last = self._dead_point_time(found, given, time)
-        time = time[: len(found.z)]
-        if last is not None and found.last_position is not None:
-            ends = self.input_rates(np.array([last]))._replace(u=found.last_position[1][None])
-            whole = InputRates(*(np.vstack(both) for both in zip(told.inputs, ends, strict=True)))
-            sure = told.fast_samples and told.fast_samples.padded(0, 1)
-            told = told._replace(
-                z=np.vstack([told.z, found.last_position[0]]),
-                inputs=whole,
-                dead_points=(len(told.z),) if told.outcome is Outcome.DEAD_POINT else (),
-                fast_samples=sure,
-            )
-            time = np.append(time, last)
-        return build_motion(self.solver, self.known.remarks, told, self.with_jerk, _TimeCourse(self, told, time), time)
-
-    def _dead_point_time(self, found: FollowedSamples, given: InputRates, time: Array) -> float | None:
-        """When a run comes to its dead point (s). Of several inputs that move there at once no time is told: between
-        samples they are followed along a straight way, which is not theirs."""
-        if (
-            found.last_position is None
-            or found.stopped is None
-            or found.stopped.outcome
-            not in (
-                Outcome.DEAD_POINT,
-                Outcome.STOP,
-            )
-        ):
-            return None
-        row = len(found.z) - 1
-        moving = np.flatnonzero(given.u[row + 1] != given.u[row])
-        if len(moving) != 1 or np.all(found.last_position[1] == given.u[row]):
-            return None
-        place = float(found.last_position[1][moving[0]])
-
-        def left(t: float) -> float:
-            return float(self.input_rates(np.array([t])).u[0, moving[0]]) - place
-
-        return find_root(left, float(time[row]), float(time[row + 1]))
-
-    def input_rates(self, time: Array) -> InputRates:
-        """The inputs at times (s)."""
-        parts = np.array([input_law_rates(each, time) for each in self.solver.mechanism.inputs])
-        return InputRates(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
+def run_in_time(
+    mechanism: Mechanism, steps: int, duration: float | None, branches: Sequence[int], with_jerk: bool
+) -> Motion:
+    """The run from the start of the laws to the end of the longest, or for a duration (s)."""
+    known = solved_mechanism(mechanism)
+    solver, z = known.solver, known.assembly.z
+    laws = [driven.law.duration for driven in mechanism.inputs if driven.law is not None]
+    if duration is None:
+        if not laws:
+            raise BadInput("duration", "no input has a law; say for how long (s) they run")
+        duration = max(laws)
+    time = np.linspace(0.0, duration, steps + 1)
+    run = follow_samples(solver, z, timed_inputs(solver, time), tuple(branches))
+    if run.stopped is not None and len(run.z) < 2:
+        problem = stopped_at_start(solver, z, run.stopped)
+        if problem is not run.stopped:
+            raise problem
+    last = _stop_time(solver, run, time)
+    time = time[: len(run.z)]
+    if last is not None and run.last_position is not None:
+        z, u = run.last_position
+        inputs = timed_inputs(solver, np.array([last]))._replace(u=u[None])
+        run = run.with_last_row(z, inputs, run.outcome is Outcome.DEAD_POINT)
+        time = np.append(time, last)
+    return build_motion(solver, known.remarks, run, with_jerk, time, _TimeLimits(solver, run, time).find)
 
 
-def input_law_rates(given: Input, time: Array) -> Array:
-    """Position and first, second and third rate of an input (4, times)."""
-    if given.law is not None:
-        return np.asarray(given.law.evaluate(time, given.position, given.velocity))
-    velocity = given.velocity + given.acceleration * time
-    position = given.position + given.velocity * time + 0.5 * given.acceleration * time**2
-    return np.array([position, velocity, np.full_like(time, given.acceleration), np.zeros_like(time)])
+def _stop_time(solver: PositionSolver, run: RunSamples, time: Array) -> float | None:
+    """When a run comes to its dead point or stop (s). Of several inputs that move there at once no time is reported:
+    between samples they are followed along a straight line, which is not their path."""
+    if run.last_position is None or run.outcome not in (Outcome.DEAD_POINT, Outcome.STOP):
+        return None
+    row, (_, u) = len(run.z) - 1, run.last_position
+    moves = timed_inputs(solver, time[row : row + 2]).u[1] != run.inputs.u[row]
+    if np.count_nonzero(moves) != 1 or np.all(u == run.inputs.u[row]):
+        return None
+    return _time_at(solver, u, moves.astype(float), time[row], time[row + 1])
 
 
-class _TimeCourse:
-    """A run in time between its rows."""
+def _time_at(solver: PositionSolver, u: Array, direction: Array, first: float, last: float) -> float:
+    """When between two times (s) the inputs are at u along a direction."""
 
-    def __init__(self, timed: TimeRun, found: RunSamples, time: Array):
-        self.timed, self.found, self.time = timed, found, time
-        self.singular_rows = frozenset(found.branch_rates)
-        self.fork_positions: tuple[float, ...] = ()
+    def distance(t: float) -> float:
+        return float((timed_inputs(solver, np.array([t])).u[0] - u) @ direction)
 
-    @property
-    def unknowns(self) -> Array:
-        """See `FollowedPath.unknowns`."""
-        return self.found.z
+    return find_root(distance, float(first), float(last))
 
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+
+@dataclass(eq=False)
+class _TimeLimits:
+    """Looks for the limits of a run in time between its rows."""
+
+    solver: PositionSolver
+    run: RunSamples
+    time: Array
+
+    def find(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
-        solver, found = self.timed.solver, self.found
-        watched = watched_outputs(solver)
-        met = list(self._change_point_times())
-        switched = [at for at, each in met if each.passed.is_switched]
-        told = list(self._stroke_ends(motion, watched, switched))
-        for at, each in met:
-            pair = next(g.pair for g, w in zip(solver.mechanism.inputs, each.input_direction, strict=True) if w)
-            told.append(Limit("change point", pair, at, at, None, change_point_remark(solver, each)))
-        for row in found.dead_points:
-            moved = int(np.argmax(np.abs(found.inputs.u[row] - found.inputs.u[row - 1])))
-            pair = solver.mechanism.inputs[moved].pair
-            place = float(found.inputs.u[row, moved] * self.timed.scale[moved])
-            told.append(Limit("input dead point", pair, float(self.time[row]), place))
-        if found.outcome is Outcome.STOP:
-            z, u, at = found.z[-1], found.inputs.u[-1], float(self.time[-1])
-            told += [Limit("stop", each.pair, at, each.position) for each in solver.stops_at(z, u)]
-        return tuple(sorted(told, key=lambda each: each.input))
+        solver, run = self.solver, self.run
+        passages = list(self._change_point_times())
+        limits = list(self._stroke_ends(motion, [time for time, passed in passages if passed.is_switched]))
+        for time, passed in passages:
+            pair = solver.mechanism.inputs[int(np.flatnonzero(passed.input_direction)[0])].pair
+            limits.append(Limit("change point", pair, time, time, None, change_point_remark(solver, passed)))
+        for row in run.dead_points:
+            index = int(np.argmax(np.abs(run.inputs.u[row] - run.inputs.u[row - 1])))
+            pair = solver.mechanism.inputs[index].pair
+            position = float(run.inputs.u[row, index]) * (solver.unit if solver.is_sliding(pair) else 1.0)
+            limits.append(Limit("input dead point", pair, float(self.time[row]), position))
+        if run.outcome is Outcome.STOP:
+            for stop in solver.stops_at(run.z[-1], run.inputs.u[-1]):
+                limits.append(Limit("stop", stop.pair, float(self.time[-1]), stop.position))
+        return tuple(sorted(limits, key=lambda limit: limit.input))
 
-    def _change_point_times(self) -> Iterator[tuple[float, PathBifurcation]]:
+    def _change_point_times(self) -> Iterator[tuple[float, PassedBifurcation]]:
         """The change points passed, each with its time (s)."""
         row = 0
-        for each in self.found.passed:
-            gone = (self.found.inputs.u - each.u) @ each.input_direction
-            for k in range(row, len(gone)):
-                if abs(gone[k]) < END_TOLERANCE:
-                    yield float(self.time[k]), each
-                elif k + 1 < len(gone) and gone[k] * gone[k + 1] < 0.0 and abs(gone[k + 1]) >= END_TOLERANCE:
-
-                    def left(t: float, each: PathBifurcation = each) -> float:
-                        return float((self.timed.input_rates(np.array([t])).u[0] - each.u) @ each.input_direction)
-
-                    yield find_root(left, float(self.time[k]), float(self.time[k + 1])), each
+        for passed in self.run.passed:
+            distance = (self.run.inputs.u - passed.u) @ passed.input_direction
+            for k in range(row, len(distance)):
+                after = distance[k + 1] if k + 1 < len(distance) else 0.0
+                if abs(distance[k]) < END_TOLERANCE:
+                    time = float(self.time[k])
+                elif distance[k] * after < 0.0 and abs(after) >= END_TOLERANCE:
+                    time = _time_at(self.solver, passed.u, passed.input_direction, self.time[k], self.time[k + 1])
                 else:
                     continue
+                yield time, passed
                 row = k + 1
                 break
 
-    def _stroke_ends(self, motion: Motion, watched: WatchedOutputs, switched: list[float]) -> Iterator[Limit]:
-        rates_of = [np.asarray(list(motion.pair(pair.name).values())[1], dtype=float) for pair in watched.pairs]
-        for pair, velocity in zip(watched.pairs, rates_of, strict=True):
-            least = STANDING_RATE * max(float(np.nanmax(np.abs(velocity), initial=0.0)), STANDING_RATE)
-            sure = np.flatnonzero(np.abs(velocity) > least)
-            for before, after in pairwise(sure.tolist()):
-                if velocity[before] * velocity[after] > 0.0 or after - before > 2:
-                    continue  # a rest in between is no end of a stroke at one time
-                first, last = float(self.time[before]), float(self.time[after])
-                if any(first <= at <= last for at in switched):
-                    continue  # it is the branch that turns, not the output
-                base = after if before in self.found.branch_rates else before
+    def _stroke_ends(self, motion: Motion, switch_times: list[float]) -> Iterator[Limit]:
+        """The ends of the strokes of all outputs."""
+        if len(motion) < 2:
+            return
+        run = ContinuousRun(motion)
+        for output in watched_outputs(self.solver):
 
-                def output_velocity(t: float, row: int = base, name: str = pair.name) -> float:
-                    return self._output_at(row, t, name)[1]
+            def velocity(motion: Motion, output: Pair = output) -> Array:
+                return _output_rates(motion, output)[1]
 
-                at = find_root(output_velocity, first, last)
-                value = self._output_at(base, at, pair.name)[0]
-                yield Limit("stroke end", pair.name, at, value)
+            of_rows = velocity(motion)
+            threshold = STANDING_RATE * max(float(np.nanmax(np.abs(of_rows), initial=0.0)), STANDING_RATE)
+            brackets = [
+                (before, after)
+                for before, after in pairwise(np.flatnonzero(np.abs(of_rows) > threshold).tolist())
+                # a rest in between is no end of a stroke at one time
+                if of_rows[before] * of_rows[after] <= 0.0
+                and after - before <= 2
+                # nor is a change of the branch, which is what turns there
+                and not any(self.time[before] <= time <= self.time[after] for time in switch_times)
+            ]
+            if brackets:
+                rows = np.array(brackets).T
+                times = run.roots(velocity, tuple(self.time[rows]), tuple(of_rows[rows]), np.zeros(len(brackets)))
+                positions = _output_rates(run.motion_at(times), output)[0]
+                yield from (
+                    Limit("stroke end", output.name, time, position)
+                    for time, position in zip(times.tolist(), positions.tolist(), strict=True)
+                )
 
-    def _output_at(self, row: int, time: float, pair: str) -> tuple[float, float]:
-        """Position and velocity of an output at a time after a row."""
-        solver = self.timed.solver
-        given = self.timed.input_rates(np.array([time]))
-        while row and row in self.singular_rows:
-            row -= 1  # from a change point several ways lead on
-        way = follow_straight(solver, solver.inputs.p, self.found.z[row], self.found.inputs.u[row], given.u[0])
-        local = {0: way.branch_rates[1]} if 1 in way.branch_rates else {}
-        parts = [
-            part[0] * solver.scale for part in sample_rates(solver, way.z[-1:], given, local, False).coordinate_rates
-        ]
-        jets = [Jet(*(float(part[column]) for part in parts)) for column in range(len(parts[0]))]
-        frames, own = frames_from_coordinates(jets, solver.column, solver.shapes, solver.pairs)
-        position, velocity, *_ = value_and_rates(
-            solver.relative_motions[pair].input_position_at(solver.shapes, frames, own)
-        )
-        return float(position), float(velocity)
+
+def _output_rates(motion: Motion, output: Pair) -> list[Array]:
+    """Position, velocity and acceleration of an output at all rows of a motion (rows,)."""
+    rates = value_and_rates(output.input_position_at(motion.shapes, motion.frames, motion.own))
+    return [np.broadcast_to(rate, (len(motion),)) for rate in rates]

@@ -14,7 +14,7 @@ from planar.model.file_units import FileUnits
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase
 from planar.results.motion import Motion
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 
 REACH, ORDER, WHOLE_TURN = "the reach", "the order", "the whole turn"
 ONE_BRANCH, ONE_CIRCUIT = "one branch", "one circuit"

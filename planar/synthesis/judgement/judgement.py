@@ -19,7 +19,7 @@ from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.grids.grid_motion import motion_over_input
+from planar.solving.input_grid import motion_over_input
 from planar.synthesis.judgement.defects import ORDER, REACH, WHOLE_TURN, Defect, region_defects, transmission_defects
 from planar.synthesis.judgement.design_assemblies import DesignAssemblies, EntryLocator, EntryPlace, PlaceWords
 from planar.synthesis.judgement.input_range import InputRange, input_range, ordered_inputs, range_motion

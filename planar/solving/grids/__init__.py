@@ -1,1 +1,0 @@
-"""Positions over a grid of several inputs."""
