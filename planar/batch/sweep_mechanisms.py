@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike
 from planar.batch.executor import in_order, run_tasks, thread_count
 from planar.batch.general_path import solve_design
 from planar.batch.mechanisms.linkage_runs import solve_by_blocks
-from planar.batch.mechanisms.linkages import SweepRequest, wanted_points
+from planar.batch.mechanisms.linkages import SweepRequest
 from planar.batch.mechanisms.parts import (
     PART_SIZE,
     PartRuns,
@@ -283,8 +283,7 @@ def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swe
     mechanism = replace(mechanism, inputs=inputs)
     pair = inputs[running].pair
     grid = None
-    members = {each.name: each.members for each in named_points(mechanism)}
-    names = tuple(wanted_points(mechanism, members, request.points))
+    names = tuple(_result_points(mechanism, request.points))
     if relative_motions(mechanism)[pair].input_kind is not Measure.LENGTH:
         grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
     ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
@@ -293,3 +292,11 @@ def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swe
     parts = [{name: out[:, k, i] for i, name in enumerate(names)} for k in range(out.shape[1])]
     position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
     return Swept(position, velocity, acceleration, told.input, told.status, str(told.message or told.rate_remark), True)
+
+
+def _result_points(mechanism: Mechanism, points: Sequence[str] | None) -> list[str]:
+    """The names of the points that are results of a mechanism: those of `points` that it has, or all that move."""
+    members = {name: {link for link, _ in at} for name, at in named_points(mechanism)}
+    if points is not None:
+        return [name for name in points if name in members]
+    return [name for name, links in members.items() if mechanism.frame not in links]

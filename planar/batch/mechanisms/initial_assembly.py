@@ -54,7 +54,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
     if starts.take_solved_frames():
         is_sure = starts.run(np.full(linkage_count, LEAST_CLEARANCE))
     cost, clearance = np.zeros(linkage_count), np.full(linkage_count, LEAST_CLEARANCE)
-    margins: list[tuple[Array, Array]] = []
+    margins: list[tuple[IntArray, Array]] = []
     signs, z = np.ones((blocks, MAX_SIGNS)), np.zeros((blocks, MAX_UNKNOWNS))
     for batch in linkages.batches:
         kind, owner, numbers = batch.block_type, batch.owner, batch.block_numbers

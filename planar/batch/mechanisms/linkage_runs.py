@@ -25,7 +25,7 @@ from planar.batch.mechanisms.block_type import (
     write_formula,
 )
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_linkage_assemblies
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkageGroup, SweepRequest, linkage_group
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, SweepRequest, make_linkage_arrays
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.batch.mechanisms.results import Swept, swept_from_rows
 from planar.batch.mechanisms.tape_runs import (
@@ -48,7 +48,7 @@ from planar.batch.mechanisms.tape_runs import (
     make_values,
     run_taped_linkages,
 )
-from planar.batch.stop_checks import find_first_stop
+from planar.batch.stop_checks import find_first_stop, watched_links
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
@@ -63,20 +63,22 @@ INPUT_NUMBERS = 5
 
 def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> dict[int, Swept]:
     """Of mechanisms, by their numbers, all those that can be partitioned into blocks of links, and are sure."""
-    group = linkage_group(mechanisms, request)
-    if group is None:
+    arrays = make_linkage_arrays(mechanisms, request)
+    if arrays is None:
         return {}
-    arrays, start = group.arrays, find_linkage_assemblies(group.arrays)
-    first_point = part_offsets(np.bincount(arrays.points.owner, minlength=len(arrays)))
-    values = make_values(int(first_point[-1]), request.steps, request.rates)
+    start = find_linkage_assemblies(arrays)
+    names = [request.point_names(structure) for structure in arrays.structures]
+    first_point = part_offsets([len(own) for own in names])
+    first_watched = first_point[-1] + part_offsets(np.bincount(arrays.watched_points.owner, minlength=len(arrays)))
+    values = make_values(int(first_watched[-1]), request.steps, request.rates)
     taped = _make_tape(arrays, start).select(np.flatnonzero(start.is_sure))
     kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
 
     def find_ending(number: int, run: FineRun) -> LinkageEnding | None:
-        watched = np.arange(first_point[number] + len(group.names[number]), first_point[number + 1])
-        return _find_ending(group, number, run, run.places(watched), request)
+        places = run.places(np.arange(first_watched[number], first_watched[number + 1]))
+        return _find_ending(arrays, number, run, places, request)
 
-    watched = np.array([bool(group.watched[number]) for number in taped.which.tolist()], dtype=bool)
+    watched = np.diff(first_watched)[taped.which] > 0
     run = run_taped_linkages(taped, kinds, values, request.steps, request.rates, find_ending, watched)
     stopped = np.flatnonzero(run.is_decided & (run.solved <= request.steps))
     clear_points(values, first_point, taped.which[stopped], run.solved[stopped])
@@ -84,27 +86,28 @@ def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> d
     swept = {}
     for k in np.flatnonzero(run.is_decided).tolist():
         number = int(taped.which[k])
-        names, begin, reason = group.names[number], int(first_point[number]), run.reasons.get(k, "")
+        reason = run.reasons.get(k, "")
         if run.outcome[k] == DEAD_POINT_NUMBER:
-            links, near = group.links_of_block(int(run.block[k])), group.start[number] + run.near[k]
+            links, near = arrays.links_of_block(int(run.block[k])), arrays.start[number] + run.near[k]
             reason = f"links {links} come to a dead point {_between(near)}"
         ending = int(run.solved[k]), int(run.outcome[k]), reason
-        rows = values[begin : begin + len(names), :, : request.steps + 1]
-        swept[int(group.numbers[number])] = swept_from_rows(names, rows, group.start[number] + turned, *ending)
+        rows = values[first_point[number] : first_point[number + 1], :, : request.steps + 1]
+        swept[int(arrays.which[number])] = swept_from_rows(names[number], rows, arrays.start[number] + turned, *ending)
     return swept
 
 
 def _find_ending(
-    group: LinkageGroup, number: int, run: FineRun, places: Array, request: SweepRequest
+    arrays: LinkageArrays, number: int, run: FineRun, places: Array, request: SweepRequest
 ) -> LinkageEnding | None:
-    """How a linkage of a group ends whose pairs have stops; None where that is not sure. places (two of each watched
-    link, 2, steps)."""
-    mechanism, step_count = group.mechanisms[number], run.good
+    """How a linkage ends whose pairs have stops; None where that is not sure. places (two of each watched link, 2,
+    steps)."""
+    mechanism, step_count = arrays.mechanisms[number], run.good
     point_places = np.moveaxis(places[..., :step_count], 1, 2)
     pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
-    link_places = {link: (point_places[2 * k], point_places[2 * k + 1]) for k, link in enumerate(group.watched[number])}
-    positions = group.start[number] + run.turned
-    met = find_first_stop(mechanism, float(group.arrays.unit[number]), pair, positions[:step_count], link_places)
+    links = watched_links(mechanism)
+    link_places = {link: (point_places[2 * k], point_places[2 * k + 1]) for k, link in enumerate(links)}
+    positions = arrays.start[number] + run.turned
+    met = find_first_stop(mechanism, float(arrays.unit[number]), pair, positions[:step_count], link_places)
     if met is None or (met.step is None and step_count < len(positions)):
         return None  # beside a dead point it is not clear which comes first
     if met.step is None:
@@ -119,18 +122,16 @@ def _between(inputs: Array) -> str:
 
 def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     """The tape of all linkages: the inputs of a linkage, then its blocks, then its result points."""
-    linkage_count, inputs, points = len(arrays), arrays.inputs, arrays.points
-    block_owner = np.empty(arrays.block_count, dtype=np.int64)
-    for batch in arrays.batches:
-        block_owner[batch.block_numbers] = batch.owner
+    linkage_count, inputs = len(arrays), arrays.inputs
+    points = arrays.points.followed_by(arrays.watched_points)
+    block_owner = np.repeat(np.arange(linkage_count), np.diff(arrays.first_block))
     owners = inputs.owner, block_owner, points.owner
-    counts = np.array([np.bincount(owner, minlength=linkage_count) for owner in owners])
-    first = part_offsets(counts.sum(axis=0))
-    earlier_counts = np.concatenate([np.zeros((1, linkage_count), dtype=np.int64), np.cumsum(counts, axis=0)])
-    at_input, at_block, at_point = (
-        (first[:-1] + earlier - part_offsets(values)[:-1])[owner] + np.arange(len(owner))
-        for owner, values, earlier in zip(owners, counts, earlier_counts, strict=False)
-    )
+    first = part_offsets(np.bincount(np.concatenate(owners), minlength=linkage_count))
+    # the blocks of a linkage in the order inputs, blocks of links, points
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    position = np.empty_like(order)
+    position[order] = np.arange(len(order))
+    at_input, at_block, at_point = np.split(position, np.cumsum([len(owner) for owner in owners])[:-1])
     numbers = [_block_numbers(batch, start) for batch in arrays.batches]
     slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
     p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in numbers))))
