@@ -196,7 +196,7 @@ def test_linkages_as_arrays_in_parts_and_with_points_of_some(monkeypatch):
     given, rates = as_arrays([dyads(seed, 4 + seed % 4) for seed in range(7)])
     linkages = planar.pinned_linkages(*given, **rates)
     whole = planar.sweep_each(linkages, 100, ["P5", "P0"])
-    monkeypatch.setattr(sweep_mechanisms, "LINKAGES_PART_SIZE", 3)
+    monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 3)
     with ThreadPoolExecutor(2) as pool:
         found = [planar.sweep_each(linkages, 100, ["P5", "P0"], executor=each) for each in (None, pool)]
     for result in found:

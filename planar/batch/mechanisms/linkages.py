@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import NamedTuple
@@ -32,12 +32,6 @@ class SweepRequest(NamedTuple):
     points: tuple[str, ...] | None
     rates: bool
     pair: str | None
-
-    def point_names(self, structure: Structure) -> Sequence[str]:
-        """The names of the points of a structure that are results."""
-        if self.points is None:
-            return structure.moving_points
-        return [name for name in self.points if name in structure.members]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +91,19 @@ class PointArrays(NamedTuple):
 class LinkageArrays:
     """Linkages as arrays, lengths in units of `unit` (m).
 
-    `which` (linkages,) are their numbers among the mechanisms of a part, `start` (linkages,) the position of the input
-    that runs (rad), `tolerance` that of residuals, `link_counts` how many links and inputs each has beside the frame.
-    `batches`: one of each block type; the blocks of a linkage are solved in the order of their numbers. `sketch`: x and
-    y in the link, and in the sketch (sizes). `shown_points`: as `sketch`, see `Structure`. `points`: x and y in the
-    link (m) of the points that are results; `watched_points`: two of each link that decides where a pair with stops
-    is, the origin of its axes and the place at the size on the x-axis.
+    `which` (linkages,) are their numbers in a part, `numbers` those of all linkages, of linkage k after
+    first_number[k]; `start` (linkages,) the position of the input that runs (rad), `tolerance` that of residuals,
+    `link_counts` how many links and inputs each has beside the frame. `batches`: one of each block type; the blocks of
+    a linkage are solved in the order of their numbers. `sketch`: x and y in the link, and in the sketch (sizes).
+    `shown_points`: as `sketch`, see `Structure`. `watched_points`: two of each link that decides where a pair with
+    stops is, x and y in the link (m): the origin of its axes and the place at the size on the x-axis.
     """
 
     mechanisms: Sequence[Mechanism]
     structures: Sequence[Structure]
     which: IntArray
+    numbers: Array
+    first_number: IntArray
     start: Array
     link_counts: IntArray
     unit: Array
@@ -117,7 +113,6 @@ class LinkageArrays:
     inputs: InputArrays
     sketch: PointArrays
     shown_points: PointArrays
-    points: PointArrays
     watched_points: PointArrays
 
     def __len__(self) -> int:
@@ -128,6 +123,14 @@ class LinkageArrays:
     def block_count(self) -> int:
         """How many blocks all linkages have."""
         return int(self.first_block[-1])
+
+    def points(self, names: Sequence[Sequence[str]]) -> PointArrays:
+        """Points of every linkage by their names: x and y in the link (m)."""
+        parts = [[one.members[name][0] for name in own] for one, own in zip(self.structures, names, strict=True)]
+        owner, point = _concatenate([np.array(part, dtype=np.int64) for part in parts])
+        link_index = np.concatenate([one.point_places[part] for one, part in zip(self.structures, parts, strict=True)])
+        first = 2 * point + self.first_number[owner]
+        return PointArrays(owner, link_index, np.stack([self.numbers[first], self.numbers[first + 1]], axis=1))
 
     def links_of_block(self, number: int) -> str:
         """The names of the inner links of a block."""
@@ -145,12 +148,13 @@ class _Row(NamedTuple):
     first: int
 
 
-def make_linkage_arrays(mechanisms: Sequence[Mechanism], request: SweepRequest) -> LinkageArrays | None:
-    """Those of the mechanisms that can be solved block after block; None if there are none."""
+def make_linkage_arrays(mechanisms: Mapping[int, Mechanism], pair: str | None) -> LinkageArrays | None:
+    """Those of the mechanisms, by their numbers, that can be solved block after block, with the input that runs at
+    `pair`; None if there are none."""
     rows: list[_Row] = []
     numbers: list[float] = []
-    for k, mechanism in enumerate(mechanisms):
-        running = running_input_index(mechanism, request.pair, "inputs")
+    for k, mechanism in mechanisms.items():
+        running = running_input_index(mechanism, pair, "inputs")
         try:
             structure, mechanism_numbers = partition_mechanism(mechanism)
         except (NotPartitionable, BadInput, PointPlacementError):
@@ -166,7 +170,7 @@ def make_linkage_arrays(mechanisms: Sequence[Mechanism], request: SweepRequest) 
     if has_short_arm.any():
         kept = np.flatnonzero(~has_short_arm)
         rows, unit, reach = [rows[k] for k in kept.tolist()], unit[kept], reach[kept]
-    return _make_arrays(rows, values, unit, reach, request) if rows else None
+    return _make_arrays(rows, values, unit, reach) if rows else None
 
 
 def _concatenate(parts: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
@@ -203,9 +207,7 @@ def _has_short_arm(rows: Sequence[_Row], values: Array, unit: Array) -> BoolArra
     return is_short
 
 
-def _make_arrays(
-    rows: Sequence[_Row], values: Array, unit: Array, reach: Array, request: SweepRequest
-) -> LinkageArrays:
+def _make_arrays(rows: Sequence[_Row], values: Array, unit: Array, reach: Array) -> LinkageArrays:
     structures, first = [row.structure for row in rows], np.array([row.first for row in rows])
     first_block = part_offsets([len(structure.blocks) for structure in structures])
 
@@ -218,14 +220,12 @@ def _make_arrays(
         coordinates = np.stack([values[index + part] for index in indices for part in (0, 1)], axis=1)
         return PointArrays(owner, link_index, coordinates / unit[owner][:, None])
 
-    points = [[one.members[name][0] for name in request.point_names(one)] for one in structures]
-    owner, point = _concatenate([np.array(part, dtype=np.int64) for part in points])
-    link_index = np.concatenate([one.point_places[part] for one, part in zip(structures, points, strict=True)])
-    coordinates = 2 * point + first[owner]
     return LinkageArrays(
         [row.mechanism for row in rows],
         structures,
         np.array([row.number for row in rows]),
+        values,
+        first,
         np.array([row.mechanism.inputs[row.running].position for row in rows]),
         np.array([one.place_count - 1 for one in structures]),
         unit,
@@ -235,7 +235,6 @@ def _make_arrays(
         _input_arrays(rows, unit),
         located([one.sketch for one in structures]),
         located([one.shown_points for one in structures]),
-        PointArrays(owner, link_index, np.stack([values[coordinates], values[coordinates + 1]], axis=1)),
         _watched_points(rows, unit),
     )
 

@@ -101,9 +101,9 @@ def find_endings(part: SweptPart) -> tuple[tuple[int, int, str], ...]:
     status = part.last_status
     codes, first, counts = np.unique(status[status != 0], return_index=True, return_counts=True)
     ended = np.flatnonzero(status)
-    found = [(int(codes[k]), int(counts[k]), part.swept(int(ended[first[k]])).reason) for k in np.argsort(first)]
-    few = [each for each in part.others if each.reason and not each.status.any()]
-    return (*found, *([(0, len(few), few[0].reason)] if few else []))
+    endings = [(int(codes[k]), int(counts[k]), part.reason(int(ended[first[k]]))) for k in np.argsort(first)]
+    few = [swept for swept in part.general.values() if swept.reason and not swept.status.any()]
+    return (*endings, *([(0, len(few), few[0].reason)] if few else []))
 
 
 def end_message(done: int, reason: str) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from numpy.typing import DTypeLike
 from planar.batch.block import SolvedDesigns
 from planar.batch.executor import in_order, run_tasks
 from planar.batch.mechanisms.linkages import SweepRequest
+from planar.batch.mechanisms.part_runs import solve_part
 from planar.batch.mechanisms.parts import PartRuns, end_message, find_endings, part_messages, stream_parts
 from planar.batch.mechanisms.results import Each, SweptPart
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
@@ -242,15 +243,11 @@ class ReductionStore(BlockStore):
         return found if listed is None else replace(found, design=listed.design, assembly=listed.number)
 
 
-SolvePart = Callable[[list[Mechanism] | PinnedLinkages, SweepRequest, str], SweptPart]
-
-
 def sweep_reduced(
     mechanisms: Iterable[MechanismSource | PinnedLinkages],
     request: SweepRequest,
     runs: PartRuns,
     reduce: Mapping[str, str | Reduction[Each]],
-    solve: SolvePart,
 ) -> ReducedSweep:
     """Reductions alone of all mechanisms, of which only those are held that are being solved."""
     wanted = read_reductions(reduce, str, request.steps)
@@ -259,7 +256,7 @@ def sweep_reduced(
             raise BadInput("reduce", f"mechanisms tell points alone, not {each.name}.{each.quantity}")
     points, rates = wanted.with_points(request.points, request.rates)
     request = request._replace(points=points, rates=rates)
-    solve_part = partial(_solve_and_reduce, solve=solve, request=request, reductions=wanted.functions, dtype=runs.dtype)
+    solve_part = partial(_solve_and_reduce, request=request, reductions=wanted.functions, dtype=runs.dtype)
     blocks: list[ReducedBlock] = []
     done, missing = 0, set(points or ())
     taken = 0
@@ -290,24 +287,21 @@ def sweep_reduced(
 
 def _solve_and_reduce(
     part: list[Mechanism] | PinnedLinkages,
-    solve: SolvePart,
     request: SweepRequest,
     reductions: Mapping[str, Reduction[Each]],
     dtype: str,
 ) -> tuple[ReducedBlock, set[str]]:
     """Reductions of some mechanisms, and which of the points that are wanted are there."""
-    solved = solve(part, request, "float64")
-    there = {name for name in request.points or () if np.any(solved.point_rows(name) >= 0)}
-    return reduce_part(solved, reductions, dtype), there
+    solved = solve_part(part, request)
+    return reduce_part(solved, reductions, dtype), solved.present_points(request.points or ())
 
 
 def reduce_part(part: SweptPart, reductions: Mapping[str, Reduction[Each]], dtype: str) -> ReducedBlock:
     """What is kept of some mechanisms."""
-    general = [each for each in part.others if each.general]
-    positions = sum(int(np.sum(each.status == 0)) for each in general)
-    some = Each((part,), positions, len(general), ())
+    positions = sum(int(np.sum(each.status == 0)) for each in part.general.values())
+    some = Each((part,), positions, len(part.general), ())
     return ReducedBlock(
-        reduce_all(some, reductions, dtype), part.last_status, positions, len(general), find_endings(part)
+        reduce_all(some, reductions, dtype), part.last_status, positions, len(part.general), find_endings(part)
     )
 
 

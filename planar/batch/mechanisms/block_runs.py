@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
@@ -25,14 +25,13 @@ from planar.batch.mechanisms.block_type import (
     write_formula,
 )
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_linkage_assemblies
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, SweepRequest, make_linkage_arrays
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays, SweepRequest
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
-from planar.batch.mechanisms.results import Swept, swept_from_rows
+from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
     FIRST_ROOM_SLOT,
     FRAME,
-    FULL_TURN,
     LEAST_COSINE,
     POINT_ROWS,
     STEP_TABLE,
@@ -43,9 +42,8 @@ from planar.batch.mechanisms.tape_runs import (
     BlockKinds,
     FineRun,
     LinkageEnding,
+    PartRun,
     TapedLinkages,
-    clear_points,
-    make_values,
     run_taped_linkages,
 )
 from planar.batch.stop_checks import find_first_stop, watched_links
@@ -53,7 +51,7 @@ from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.geometry import Vector
-from planar.model.mechanism import Mechanism, running_input_index
+from planar.model.mechanism import running_input_index
 
 RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
 """Kinds of the blocks of a tape: types of blocks of links come last."""
@@ -61,69 +59,54 @@ INPUT_NUMBERS = 5
 """Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
 
 
-def solve_by_blocks(mechanisms: Sequence[Mechanism], request: SweepRequest) -> dict[int, Swept]:
-    """Of mechanisms, by their numbers, all those that can be partitioned into blocks of links, and are sure."""
-    arrays = make_linkage_arrays(mechanisms, request)
-    if arrays is None:
-        return {}
+def run_blocks(arrays: LinkageArrays, points: PointTable, values: Array, run: PartRun, request: SweepRequest) -> None:
+    """Run linkages block after block; `points` says which are results, and their rows in values.
+
+    Behind these rows are those of the points of links that decide where pairs with stops are.
+    """
     start = find_linkage_assemblies(arrays)
-    names = [request.point_names(structure) for structure in arrays.structures]
-    first_point = part_offsets([len(own) for own in names])
-    first_watched = first_point[-1] + part_offsets(np.bincount(arrays.watched_points.owner, minlength=len(arrays)))
-    values = make_values(int(first_watched[-1]), request.steps, request.rates)
-    taped = _make_tape(arrays, start).select(np.flatnonzero(start.is_sure))
+    results = arrays.points([points.names(k) for k in arrays.which.tolist()])
+    first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
+    rows = np.arange(len(results.owner)) + (points.first[arrays.which] - first_result[:-1])[results.owner]
+    watched = arrays.watched_points
+    first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
+    rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
+    taped = _make_tape(arrays, start, results.followed_by(watched), rows).select(np.flatnonzero(start.is_sure))
+    find_endings = {
+        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
+        for k in np.flatnonzero(np.diff(first_watched)).tolist()
+    }
     kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
-
-    def find_ending(number: int, run: FineRun) -> LinkageEnding | None:
-        places = run.places(np.arange(first_watched[number], first_watched[number + 1]))
-        return _find_ending(arrays, number, run, places, request)
-
-    watched = np.diff(first_watched)[taped.which] > 0
-    run = run_taped_linkages(taped, kinds, values, request.steps, request.rates, find_ending, watched)
-    stopped = np.flatnonzero(run.is_decided & (run.solved <= request.steps))
-    clear_points(values, first_point, taped.which[stopped], run.solved[stopped])
-    turned = np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
-    swept = {}
-    for k in np.flatnonzero(run.is_decided).tolist():
-        number = int(taped.which[k])
-        reason = run.reasons.get(k, "")
-        if run.outcome[k] == DEAD_POINT_NUMBER:
-            links, near = arrays.links_of_block(int(run.block[k])), arrays.start[number] + run.near[k]
-            reason = f"links {links} come to a dead point {_between(near)}"
-        ending = int(run.solved[k]), int(run.outcome[k]), reason
-        rows = values[first_point[number] : first_point[number + 1], :, : request.steps + 1]
-        swept[int(arrays.which[number])] = swept_from_rows(names[number], rows, arrays.start[number] + turned, *ending)
-    return swept
+    run_taped_linkages(taped, kinds, values, request.steps, run, find_endings)
+    is_dead = run.is_decided & (run.outcome == DEAD_POINT_NUMBER)
+    for k in np.flatnonzero(is_dead[arrays.which]).tolist():
+        number = int(arrays.which[k])
+        links = arrays.links_of_block(int(run.block[number]))
+        run.reasons[number] = dead_point_reason(links, arrays.start[k] + run.near[number])
 
 
 def _find_ending(
-    arrays: LinkageArrays, number: int, run: FineRun, places: Array, request: SweepRequest
+    arrays: LinkageArrays, k: int, rows: IntArray, running_pair: str | None, run: FineRun
 ) -> LinkageEnding | None:
-    """How a linkage ends whose pairs have stops; None where that is not sure. places (two of each watched link, 2,
-    steps)."""
-    mechanism, step_count = arrays.mechanisms[number], run.good
-    point_places = np.moveaxis(places[..., :step_count], 1, 2)
-    pair = mechanism.inputs[running_input_index(mechanism, request.pair, "inputs")].pair
-    links = watched_links(mechanism)
-    link_places = {link: (point_places[2 * k], point_places[2 * k + 1]) for k, link in enumerate(links)}
-    positions = arrays.start[number] + run.turned
-    met = find_first_stop(mechanism, float(arrays.unit[number]), pair, positions[:step_count], link_places)
+    """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
+    sure."""
+    mechanism, step_count = arrays.mechanisms[k], run.good
+    places = np.moveaxis(run.places(rows)[..., :step_count], 1, 2)
+    pair = mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair
+    link_places = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
+    positions = arrays.start[k] + run.turned
+    met = find_first_stop(mechanism, float(arrays.unit[k]), pair, positions[:step_count], link_places)
     if met is None or (met.step is None and step_count < len(positions)):
         return None  # beside a dead point it is not clear which comes first
     if met.step is None:
         return LinkageEnding(step_count)
-    near = _between(positions[[max(met.step - 1, 0), met.step]])
+    near = between(positions[[max(met.step - 1, 0), met.step]])
     return LinkageEnding(met.step, Outcome.STOP, f"{met.reason}, {near}")
 
 
-def _between(inputs: Array) -> str:
-    return f"at an input of {inputs[0]:.6g} to {inputs[1]:.6g} rad"
-
-
-def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
-    """The tape of all linkages: the inputs of a linkage, then its blocks, then its result points."""
+def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArrays, rows: IntArray) -> TapedLinkages:
+    """The tape of all linkages: the inputs of a linkage, then its blocks, then its points, each to its row."""
     linkage_count, inputs = len(arrays), arrays.inputs
-    points = arrays.points.followed_by(arrays.watched_points)
     block_owner = np.repeat(np.arange(linkage_count), np.diff(arrays.first_block))
     owners = inputs.owner, block_owner, points.owner
     first = part_offsets(np.bincount(np.concatenate(owners), minlength=linkage_count))
@@ -142,7 +125,7 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
     )
     slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
-    slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), np.arange(len(at_point))
+    slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), rows
     blocks[at_block] = np.arange(arrays.block_count)
     for number, (batch, values) in enumerate(zip(arrays.batches, numbers, strict=True)):
         indices, kind = at_block[batch.block_numbers], batch.block_type
@@ -153,7 +136,7 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies) -> TapedLinkages:
         )
         p[indices, : values.shape[1]] = values
     clearance = np.full(linkage_count, LEAST_CLEARANCE)
-    return TapedLinkages(np.arange(linkage_count), first, kinds, slots, p, blocks, arrays.tolerance, clearance)
+    return TapedLinkages(arrays.which, first, kinds, slots, p, blocks, arrays.tolerance, clearance)
 
 
 def _slot_numbers(link_indices: IntArray) -> IntArray:

@@ -1,57 +1,171 @@
-"""Linkages of pinned bars as tapes: which pin is placed from which others, step after step, for all side by side."""
+"""Linkages of pinned bars as tapes of steps, each of which places a pin: their formulas, their steps, their runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import IntEnum
+from functools import lru_cache, partial
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
+import casadi as ca
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_surely_farther
-from planar.batch.pinned.formulas import NUMBERS, PinStep
+from planar.batch.mechanisms.block_type import write_formula
+from planar.batch.mechanisms.results import PointTable, pin_number
+from planar.batch.mechanisms.tape_runs import (
+    FIRST_ROOM_SLOT,
+    LEAST_COSINE,
+    POINT_ROWS,
+    TABLE,
+    TABLE_COS,
+    TABLE_SIN,
+    BlockKinds,
+    PartRun,
+    TapedLinkages,
+    run_taped_linkages,
+)
+from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.model.pin_linkages import PinnedLinkages
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
 
 
-class ToldPins(NamedTuple):
-    """The pins that are told, numbered through all linkages (points,), and where those of each linkage begin
-    (linkages + 1,)."""
+class PinStep(IntEnum):
+    """How a pin is placed: on the crank; as the pin between two bars whose others are known; on a bar through two
+    pins. Of those the second may be one of the frame."""
 
-    pins: IntArray
-    first: IntArray
-
-    def select(self, linkages: PinnedLinkages, begin: int, end: int) -> ToldPins:
-        """Those of linkages that follow one another."""
-        points = slice(self.first[begin], self.first[end])
-        first = self.first[begin : end + 1]
-        return ToldPins(self.pins[points] - linkages.first_pin[begin], first - first[0])
+    CRANK = 0
+    DYAD = 1
+    DYAD_ON_FRAME = 2
+    CARRIED = 3
+    CARRIED_ON_FRAME = 4
 
 
-def find_told_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> ToldPins:
-    """Those of some names, of every linkage that has them; all that move, if there are none."""
+NUMBERS = 6
+"""Numbers of a step at most. Of a crank: where it is on the frame, the pin from there as it stands (m), velocity and
+acceleration. Of a dyad: the lengths of its bars (m), its sign, one by the linkage's size. Of a pin on a bar: where it
+is, in parts of the way from the first pin to the second. Then the second pin (m) where that is on the frame."""
+_FRAME_PIN = {PinStep.DYAD_ON_FRAME: 4, PinStep.CARRIED_ON_FRAME: 2}
+
+
+@lru_cache
+def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
+    """The formulas of all steps, which take two pins and write the third. `polished`: closed forms are followed by a
+    step of Newton's method."""
+    row_count = POINT_ROWS[rates]
+    rows = tuple((2, row) for row in range(row_count))
+    made = []
+    for step in PinStep:
+        frame_pin = _FRAME_PIN.get(step)
+        numbers = [FormulaInput("p", k) for k in range(NUMBERS if frame_pin is None else frame_pin)]
+        if step is PinStep.CRANK:
+            table = [FormulaInput("row", 0, row) for row in (TABLE_COS, TABLE_SIN)]
+            made.append(TapeFormula(write_formula((table, numbers), partial(_crank, rates)), rows))
+            continue
+        first, second = ([FormulaInput("row", slot, row) for row in range(row_count)] for slot in range(2))
+        if frame_pin is not None:
+            second = [FormulaInput("p", frame_pin + k) for k in range(2)]
+        inputs = first, second, numbers
+        if step in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
+            made.append(TapeFormula(write_formula(inputs, partial(_carried, rates)), rows))
+        else:
+            directions = tuple((row_count + k, row_count + k + 1, row_count + k + 2) for k in (0, 3))
+            made.append(TapeFormula(write_formula(inputs, partial(_dyad, rates, polished)), rows, directions, True))
+    return tuple(made)
+
+
+def _turned(x: ca.SX) -> ca.SX:
+    """By a right angle."""
+    return ca.vertcat(-x[1], x[0])
+
+
+def _orders(pin: ca.SX, rates: bool) -> list[ca.SX]:
+    """Place, velocity and acceleration of a pin; one that has no rates stands."""
+    order_count = POINT_ROWS[rates] // 2
+    return [pin[2 * k : 2 * k + 2] if 2 * k < pin.numel() else ca.SX.zeros(2) for k in range(order_count)]
+
+
+def _crank(rates: bool, table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
+    """Rows of a pin on the crank."""
+    pivot, pin, velocity, acceleration = numbers[:2], numbers[2:4], numbers[4], numbers[5]
+    arm = table[0] * pin + table[1] * _turned(pin)
+    if not rates:
+        return [pivot + arm]
+    return [pivot + arm, velocity * _turned(arm), acceleration * _turned(arm) - velocity**2 * arm]
+
+
+def _carried(rates: bool, first: ca.SX, second: ca.SX, numbers: ca.SX) -> list[ca.SX]:
+    """Rows of a pin on a bar: linear in those of two others."""
+    both = zip(_orders(first, rates), _orders(second, rates), strict=True)
+    return [a + numbers[0] * (b - a) + numbers[1] * _turned(b - a) for a, b in both]
+
+
+def _dyad(rates: bool, polished: bool, first: ca.SX, second: ca.SX, numbers: ca.SX) -> list[ca.SX]:
+    """Rows of the pin between two bars, these as vectors with their squared lengths, by how much of the size the
+    distances are off, and how clear they are of where two ways to assemble them meet: the squared sine between them.
+
+    The pin is where two circles about the given ones meet.
+    """
+    (a, *a_rates), (b, *b_rates) = _orders(first, rates), _orders(second, rates)
+    lengths, sign, per_size = numbers[:2], numbers[2], numbers[3]
+    squares, between = lengths**2, b - a
+    distance = ca.sumsqr(between)
+    scale = 0.5 / distance
+    height = (ca.sum1(lengths) ** 2 - distance) * (distance - (lengths[0] - lengths[1]) ** 2)
+    along, across = 0.5 + scale * (squares[0] - squares[1]), scale * (sign * ca.sqrt(height))
+    pin = a + along * between + across * _turned(between)
+    if polished:
+        bars, off = _bars(pin, (a, b), squares)
+        pin -= _solve(bars, 0.5 * off)
+    bars, off = _bars(pin, (a, b), squares)
+    rows = [pin]
+    if rates:
+        # what keeps a distance: bar * (pin' - given') = 0, and once more by time
+        velocity = _solve(bars, _dots(bars, ca.horzcat(a_rates[0], b_rates[0]).T))
+        relative = ca.horzcat(velocity - a_rates[0], velocity - b_rates[0]).T
+        acceleration = _solve(bars, _dots(bars, ca.horzcat(a_rates[1], b_rates[1]).T) - _dots(relative, relative))
+        rows += [velocity, acceleration]
+    open_ = ca.sum1(ca.fabs(off) * (0.5 * per_size / lengths))
+    directions = [part for k in range(2) for part in (bars[k, 0], bars[k, 1], squares[k])]
+    return [*rows, *directions, open_, height * (0.25 / (squares[0] * squares[1]))]
+
+
+def _bars(pin: ca.SX, given_pins: Sequence[ca.SX], squares: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """The vectors from given pins to one, row by row, and by how much their squared lengths are off."""
+    bars = ca.horzcat(*(pin - given_pin for given_pin in given_pins)).T
+    return bars, bars[:, 0] ** 2 - squares + bars[:, 1] ** 2
+
+
+def _dots(bars: ca.SX, others: ca.SX) -> ca.SX:
+    return bars[:, 0] * others[:, 0] + bars[:, 1] * others[:, 1]
+
+
+def _solve(bars: ca.SX, of: ca.SX) -> ca.SX:
+    """The vector whose products with two bars are so."""
+    scale = 1.0 / (bars[0, 0] * bars[1, 1] - bars[0, 1] * bars[1, 0])
+    x, y = of[0] * bars[1, 1] - of[1] * bars[0, 1], of[1] * bars[0, 0] - of[0] * bars[1, 0]
+    return ca.vertcat(scale * x, scale * y)
+
+
+def result_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> PointTable:
+    """The pins of these names in every linkage that has them; all that move, if there are no names."""
     if names is None:
         moves = np.ones(len(linkages.positions), dtype=bool)
         moves[frame_pins(linkages)] = False
         pins = np.flatnonzero(moves)
-        return ToldPins(pins, np.searchsorted(pins, linkages.first_pin))
+        first = np.searchsorted(pins, linkages.first_pin)
+        return PointTable(first, pins - np.repeat(linkages.first_pin[:-1], np.diff(first)))
     numbers = np.array([number for name in names if (number := pin_number(name)) is not None], dtype=np.int64)
-    there = numbers < np.diff(linkages.first_pin)[:, None]
-    named = (numbers + linkages.first_pin[:-1, None])[there]
-    return ToldPins(named, part_offsets(there.sum(axis=1)))
+    is_present = numbers < np.diff(linkages.first_pin)[:, None]
+    return PointTable(part_offsets(is_present.sum(axis=1)), np.broadcast_to(numbers, is_present.shape)[is_present])
 
 
 def frame_pins(linkages: PinnedLinkages) -> IntArray:
     """The pins on the frame, numbered through all linkages."""
-    owner = np.repeat(np.arange(len(linkages)), np.diff(linkages.first_frame_pin))
-    found: IntArray = linkages.frame_pins + linkages.first_pin[owner]
-    return found
-
-
-def pin_number(name: str) -> int | None:
-    """The number of a pin by its name; None for another name."""
-    number = name[1:]
-    return int(number) if name[:1] == "P" and number.isdecimal() and str(int(number)) == number else None
+    pins: IntArray = linkages.frame_pins + np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_frame_pin))
+    return pins
 
 
 SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
@@ -89,7 +203,7 @@ class _Steps(NamedTuple):
     two: IntArray
 
 
-def make_tape(linkages: PinnedLinkages) -> PinTape:
+def _make_tape(linkages: PinnedLinkages) -> PinTape:
     """The steps of those linkages that consist of a crank and dyads whose assembly is surely that of their places."""
     many, bar_counts = len(linkages), np.diff(linkages.first_bar)
     bar_owner = np.repeat(np.arange(many), bar_counts)
@@ -257,3 +371,52 @@ def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     (left, right), (low, high) = bounds
     wide, tall = right - left, high - low
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
+
+
+_tapes: WeakKeyDictionary[PinnedLinkages, PinTape] = WeakKeyDictionary()
+"""The tapes of linkages, as long as the linkages are kept."""
+
+
+def pin_tape(linkages: PinnedLinkages) -> PinTape:
+    """The tape of linkages, made once."""
+    tape = _tapes.get(linkages)
+    if tape is None:
+        tape = _tapes[linkages] = _make_tape(linkages)
+    return tape
+
+
+def run_pins(
+    linkages: PinnedLinkages,
+    numbers: IntArray,
+    points: PointTable,
+    rows: IntArray,
+    values: Array,
+    run: PartRun,
+    steps: int,
+) -> None:
+    """Run the linkages that have a tape; `numbers` (linkages,) are those in the part.
+
+    `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
+    that linkages share.
+    """
+    tape, rates = pin_tape(linkages), values.shape[1] == POINT_ROWS[True]
+    slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
+    slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
+    pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
+    slots[pins] = rows
+    block_slots = np.empty((len(tape.placed), 3), dtype=np.int64)
+    block_slots[:, :2], block_slots[:, 2] = slots[tape.given], slots[tape.placed]
+    block_slots[tape.kinds == PinStep.CRANK, 0] = TABLE
+    blocks = np.arange(len(block_slots))
+    taped = TapedLinkages(
+        numbers[tape.which], tape.first, tape.kinds, block_slots, tape.p, blocks, tape.tolerance, tape.clearance
+    )
+    kinds = BlockKinds(
+        lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
+    )
+    run_taped_linkages(taped, kinds, values, steps, run)
+    is_fixed = np.zeros(len(linkages.positions), dtype=bool)
+    is_fixed[frame_pins(linkages)] = True
+    is_fixed_point = is_fixed[pins]
+    values[rows[is_fixed_point]] = 0.0
+    values[rows[is_fixed_point], :2] = linkages.positions[pins[is_fixed_point]][:, :, None]
