@@ -162,7 +162,7 @@ def _sweep_parts(
         parts.append(part)
         done += len(part)
         missing -= part.present_points(missing)
-        runs.tell(done, count)
+        runs.report(done, count)
     for name in request.points or ():
         if name in missing and count and done == count:
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")

@@ -130,7 +130,7 @@ def test_blocks_without_closed_form_start_at_inexact_sketches(seed, links, blur)
     """The assembly is the one that the mechanism itself takes, though its sketch is off, or shows one point alone of a
     link that slides on another (the last)."""
     mechanism = files.from_dict(random_linkage(seed, links, blur=blur).value)
-    assert not all(each.block_type.has_closed_form for each in partition_mechanism(mechanism).structure.blocks)
+    assert not all(each.block_type.has_closed_form for each in partition_mechanism(mechanism)[0].blocks)
     result = planar.sweep_each([mechanism], 20, pair=mechanism.inputs[0].pair)
     assert result.sent == 0
     as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
@@ -327,7 +327,6 @@ def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypat
     mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
     longest = 500
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", longest)
-    monkeypatch.setattr(partition, "_block_types", {})
     monkeypatch.setattr(partition, "_structures", {})
     find_block_type.cache_clear()
     result = planar.sweep_each(mechanisms, 12)
@@ -410,7 +409,7 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
         (triads(3), [1, 4, 4, 4]),
         (MODELS["double-butterfly"], [1, 6]),
     ):
-        own = partition_mechanism(mechanism).structure
+        own = partition_mechanism(mechanism)[0]
         assert [len(group.inner_links) for group in own.blocks] == sizes
         assert sorted(own.link_index.values())[0] == 0
         known = {0, 1}
@@ -419,7 +418,7 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
             assert set(group.link_indices) <= known | inner
             assert not known & inner
             known |= inner
-    blocks = partition_mechanism(planar.from_dict(chain.document(42))).structure.blocks
+    blocks = partition_mechanism(planar.from_dict(chain.document(42)))[0].blocks
     assert len({id(group.block_type) for group in blocks}) <= 4
     with pytest.raises(NotPartitionable, match=r"held more than once|free"):
         partition_mechanism(MODELS["three-parallel-cranks"])

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.block_type import (
     COS,
     POSE_ROWS,
@@ -25,7 +26,7 @@ from planar.batch.mechanisms.block_type import (
     write_formula,
 )
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_linkage_assemblies
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays, SweepRequest
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays, SweepRequest, watched_links
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
@@ -46,12 +47,14 @@ from planar.batch.mechanisms.tape_runs import (
     TapedLinkages,
     run_taped_linkages,
 )
-from planar.batch.stop_checks import find_first_stop, watched_links
+from planar.batch.named_results.design_frames import DesignFrames
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
+from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.geometry import Vector
-from planar.model.mechanism import running_input_index
+from planar.model.mechanism import links_counting_turns, running_input_index
+from planar.solving.stops import PairStops
 
 RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
 """Kinds of the blocks of a tape: types of blocks of links come last."""
@@ -90,18 +93,50 @@ def _find_ending(
 ) -> LinkageEnding | None:
     """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
     sure."""
-    mechanism, step_count = arrays.mechanisms[k], run.good
-    places = np.moveaxis(run.places(rows)[..., :step_count], 1, 2)
-    pair = mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair
-    link_places = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
+    mechanism, unit = arrays.mechanisms[k], float(arrays.unit[k])
+    stops, counted = PairStops(mechanism, unit), links_counting_turns(mechanism)
+    u = {given.pair: np.full((run.good, 1), given.position) for given in mechanism.inputs}
+    is_long = stops.high - stops.low > TURN + SURE_DISTANCE
+    if any(
+        not counted.isdisjoint(pair.bodies) or (pair_is_long and pair.name not in u)
+        for pair, pair_is_long in zip(stops.pairs, is_long.tolist(), strict=True)
+    ):
+        return None
     positions = arrays.start[k] + run.turned
-    met = find_first_stop(mechanism, float(arrays.unit[k]), pair, positions[:step_count], link_places)
-    if met is None or (met.step is None and step_count < len(positions)):
+    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[: run.good, None]
+    places = np.moveaxis(run.places(rows)[..., : run.good], 1, 2)[:, None, :, :, None]
+    points = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
+    frames = DesignFrames(mechanism, shapes_of_links(mechanism), u, points, unit)
+    if not frames.is_clear[0]:
+        return None
+    values = np.array([frames.pair_value(pair.name)[0][:, 0] for pair in stops.pairs])
+    ending = _find_first_stop(stops, values, np.array([angle[:, 0] for angle in frames.angles.values()]))
+    if ending is None or (ending.outcome is Outcome.SOLVED and run.good < len(positions)):
         return None  # beside a dead point it is not clear which comes first
-    if met.step is None:
-        return LinkageEnding(step_count)
-    near = between(positions[[max(met.step - 1, 0), met.step]])
-    return LinkageEnding(met.step, Outcome.STOP, f"{met.reason}, {near}")
+    if ending.outcome is Outcome.SOLVED:
+        return ending
+    near = between(positions[[max(ending.solved_steps - 1, 0), ending.solved_steps]])
+    return ending._replace(reason=f"{ending.reason}, {near}")
+
+
+def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageEnding | None:
+    """The ending at the first stop, by the values of pairs with stops (stops, steps) and the angles of links (links,
+    steps); None if that is not clear."""
+    low, high, scale = (bound[:, None] for bound in (stops.low, stops.high, stops.scale))
+    counted_values = values + stops.turns(values[:, 0])[:, None]
+    distances = np.minimum(counted_values - low, high - counted_values) / scale
+    nearest = distances.min(axis=0)
+    if nearest[0] < -SURE_DISTANCE:
+        return LinkageEnding(0, Outcome.STOP, stops.describe_met(values[:, 0]))
+    is_sure = stops.sure_rows(values, np.vstack([angles, values / scale]).T)
+    if is_sure.all():
+        return LinkageEnding(len(is_sure))
+    first = int(np.argmin(is_sure))
+    if first < 2 or nearest[first - 1] < SURE_DISTANCE or nearest[first] > -SURE_DISTANCE:
+        return None
+    k = int(np.argmin(distances[:, first]))
+    is_upper = bool(values[k, first] > values[k, first - 1])
+    return LinkageEnding(first, Outcome.STOP, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units))
 
 
 def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArrays, rows: IntArray) -> TapedLinkages:
@@ -166,7 +201,8 @@ def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
         formula = TapeFormula(kind.run_formula(rates, polished), rows, directions, is_checked=True)
         return compile_block(formula, LEAST_COSINE)
 
-    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table)
+    has_newton_blocks = not all(kind.has_closed_form for kind in types)
+    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table if has_newton_blocks else None)
 
 
 def _pose_rows(rates: bool) -> int:

@@ -95,35 +95,31 @@ class _ShownBlocks(NamedTuple):
     is_shown: BoolArray
 
 
-def _start_number_count(batch: BlockBatch) -> int:
-    """The numbers of a block at its start: those of its pairs, then sums of the sketch or unknowns."""
-    kind = batch.block_type
-    added = SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle)
-    return int(batch.p.shape[1]) + added
-
-
 class _Starts:
-    """The blocks of linkages as a tape of one step, with the places of all links in a state of its own."""
+    """The blocks of linkages as a tape of one step, with the places of all links in a separate state."""
 
     def __init__(self, linkages: LinkageArrays):
         self.linkages, blocks = linkages, linkages.block_count
         self.first = part_offsets(linkages.link_counts)
         self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
         _fill_inputs(self.state, linkages, self.first)
-        self.sums = _sketch_sums(linkages.sketch, self.first)
+        self.sums = _sketch_sums(linkages.sketch_points([one.sketch for one in linkages.structures]), self.first)
         self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-        self.places = {
-            block_batch.block_type: block_batch.state_indices(self.first) for block_batch in linkages.batches
-        }
+        self.places = {batch.block_type: batch.state_indices(self.first) for batch in linkages.batches}
         self.shown: dict[BlockType, _ShownBlocks] = {}
-        owner, self.kinds = np.zeros((2, blocks), dtype=np.int64)
-        slot_count = 1 + max(block_batch.block_type.slot_count for block_batch in linkages.batches)
+        self.kinds = np.zeros(blocks, dtype=np.int64)
+        slot_count = 1 + max(kind.slot_count for kind in self.places)
         self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
-        self.p = np.zeros((blocks, max(map(_start_number_count, linkages.batches))))
+        number_counts = (
+            kind.number_count
+            + (SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle))
+            for kind in self.places
+        )
+        self.p = np.zeros((blocks, max(number_counts)))
         self.functions = []
         for kind_number, batch in enumerate(linkages.batches):
             kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            owner[indices], self.kinds[indices] = batch.owner, kind_number
+            self.kinds[indices] = kind_number
             self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
             if kind.has_closed_form:
                 self.slots[indices, kind.slot_count] = (
@@ -137,7 +133,6 @@ class _Starts:
             else:
                 self.slots[indices, kind.slot_count] = self.table.ctypes.data
                 self.functions.append(compile_newton_block(kind, False))
-        self.begins = part_offsets(np.bincount(owner, minlength=len(linkages)))
         if not all(batch.block_type.has_closed_form for batch in linkages.batches):
             self.frames = _shown_frames(linkages, self.first)
             self._take_frames()
@@ -145,7 +140,7 @@ class _Starts:
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
         tolerance = START_TOLERANCE_FACTOR * self.linkages.tolerance
-        tape = Tape(self.begins, self.kinds, self.slots, self.p, tolerance, clearance)
+        tape = Tape(self.linkages.first_block, self.kinds, self.slots, self.p, tolerance, clearance)
         return run_tape(self.functions, 1, tape).good > 0
 
     def take_solved_frames(self) -> bool:
@@ -196,7 +191,8 @@ class _ShownFrames(NamedTuple):
 
 def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
     """By the points of links, two at least that lie apart; the mechanism's frame is where it is."""
-    counts, px, py, tx, ty, along, across, _ = _sketch_sums(linkages.shown_points, first).T
+    points = linkages.sketch_points([one.shown_points for one in linkages.structures])
+    counts, px, py, tx, ty, along, across, _ = _sketch_sums(points, first).T
     divisor = np.maximum(counts, 1.0)
     turn = along - (px * tx + py * ty) / divisor, across - (px * ty - py * tx) / divisor
     is_shown = (counts > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)

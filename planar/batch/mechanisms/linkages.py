@@ -17,11 +17,10 @@ from planar.batch.mechanisms.partition import (
     Structure,
     partition_mechanism,
 )
-from planar.batch.stop_checks import watched_links
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointPlacementError
-from planar.model.mechanism import Mechanism, running_input_index
+from planar.model.mechanism import Mechanism, relative_motions, running_input_index
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 
@@ -94,9 +93,8 @@ class LinkageArrays:
     `which` (linkages,) are their numbers in a part, `numbers` those of all linkages, of linkage k after
     first_number[k]; `start` (linkages,) the position of the input that runs (rad), `tolerance` that of residuals,
     `link_counts` how many links and inputs each has beside the frame. `batches`: one of each block type; the blocks of
-    a linkage are solved in the order of their numbers. `sketch`: x and y in the link, and in the sketch (sizes).
-    `shown_points`: as `sketch`, see `Structure`. `watched_points`: two of each link that decides where a pair with
-    stops is, x and y in the link (m): the origin of its axes and the place at the size on the x-axis.
+    a linkage are solved in the order of their numbers. `watched_points`: two of each link that decides where a pair
+    with stops is, x and y in the link (m): the origin of its axes and the place at the size on the x-axis.
     """
 
     mechanisms: Sequence[Mechanism]
@@ -111,8 +109,6 @@ class LinkageArrays:
     batches: Sequence[BlockBatch]
     first_block: IntArray
     inputs: InputArrays
-    sketch: PointArrays
-    shown_points: PointArrays
     watched_points: PointArrays
 
     def __len__(self) -> int:
@@ -131,6 +127,14 @@ class LinkageArrays:
         link_index = np.concatenate([one.point_places[part] for one, part in zip(self.structures, parts, strict=True)])
         first = 2 * point + self.first_number[owner]
         return PointArrays(owner, link_index, np.stack([self.numbers[first], self.numbers[first + 1]], axis=1))
+
+    def sketch_points(self, layouts: Sequence[PointLayout]) -> PointArrays:
+        """Points of every linkage by a layout of its structure: x and y in the link, and in the world (sizes)."""
+        owner, link_index = _concatenate([layout.link_index for layout in layouts])
+        places = (np.concatenate(parts) for parts in zip(*(layout[1:] for layout in layouts), strict=True))
+        first = [part + self.first_number[owner] for part in places]
+        coordinates = np.stack([self.numbers[row + part] for row in first for part in (0, 1)], axis=1)
+        return PointArrays(owner, link_index, coordinates / self.unit[owner][:, None])
 
     def links_of_block(self, number: int) -> str:
         """The names of the inner links of a block."""
@@ -211,15 +215,6 @@ def _make_arrays(rows: Sequence[_Row], values: Array, unit: Array, reach: Array)
     structures, first = [row.structure for row in rows], np.array([row.first for row in rows])
     first_block = part_offsets([len(structure.blocks) for structure in structures])
 
-    def located(layouts: Sequence[PointLayout]) -> PointArrays:
-        """Points with their coordinates in the link and in the world (sizes)."""
-        owner, link_index = _concatenate([layout.link_index for layout in layouts])
-        indices = (
-            np.concatenate(parts) + first[owner] for parts in zip(*(layout[1:] for layout in layouts), strict=True)
-        )
-        coordinates = np.stack([values[index + part] for index in indices for part in (0, 1)], axis=1)
-        return PointArrays(owner, link_index, coordinates / unit[owner][:, None])
-
     return LinkageArrays(
         [row.mechanism for row in rows],
         structures,
@@ -233,8 +228,6 @@ def _make_arrays(rows: Sequence[_Row], values: Array, unit: Array, reach: Array)
         list(_make_batches(structures, first_block, values, first, unit)),
         first_block,
         _input_arrays(rows, unit),
-        located([one.sketch for one in structures]),
-        located([one.shown_points for one in structures]),
         _watched_points(rows, unit),
     )
 
@@ -278,3 +271,10 @@ def _watched_points(rows: Sequence[_Row], unit: Array) -> PointArrays:
     ]
     owner, link_index, *numbers = np.array(points, dtype=float).reshape(-1, 4).T
     return PointArrays(owner.astype(np.int64), link_index.astype(np.int64), np.stack(numbers, axis=1))
+
+
+def watched_links(mechanism: Mechanism) -> tuple[str, ...]:
+    """The moving links whose places decide where the pairs with stops are."""
+    motions = relative_motions(mechanism) if mechanism.stops else {}
+    links = dict.fromkeys(link for stop in mechanism.stops for link in motions[stop.pair].bodies)
+    return tuple(link for link in links if link != mechanism.frame)

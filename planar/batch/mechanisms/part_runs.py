@@ -47,7 +47,7 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
     pins = None
     if linkages is not None:
         pins = result_pins(linkages, request.points)
-        is_open[numbers[pin_tape(linkages).which]] = False
+        is_open[numbers[pin_tape(linkages).linkages.which]] = False
     arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, request.pair)
     if pins is not None and len(numbers) == len(mechanisms):
         points = pins
@@ -64,8 +64,8 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
         rows = np.arange(len(pins.codes)) + np.repeat(points.first[numbers] - pins.first[:-1], np.diff(pins.first))
         run_pins(linkages, numbers, pins, rows, values, run, request.steps)
         tape, start[numbers] = pin_tape(linkages), linkages.crank_angles
-        which = numbers[tape.which]
-        bars[which] = tape.bars[run.block[which]] - linkages.first_bar[tape.which, None]
+        which = tape.linkages.which
+        bars[numbers[which]] = tape.bars[run.block[numbers[which]]] - linkages.first_bar[which, None]
     if arrays is not None:
         run_blocks(arrays, points, values, run, request)
         start[arrays.which] = arrays.start

@@ -12,7 +12,6 @@ import numpy as np
 
 from planar.batch.mechanisms.block_type import (
     FRAME_BODY,
-    MAX_BLOCK_TYPES,
     BlockPair,
     BlockSignature,
     BlockType,
@@ -95,21 +94,17 @@ class Structure:
     shown_points: PointLayout
 
 
-class Partition(NamedTuple):
-    """A mechanism as a structure and its numbers (m, rad)."""
-
-    structure: Structure
-    numbers: list[float]
-
-
 _PairKey = tuple[type[Pair], str, tuple[str, str], str, tuple[tuple[str, str], ...]]
 """Of a pair its type, its name, its links, the name of its entry, and the points that it keeps together."""
 _structures: dict[object, Structure] = {}
 
 
-def partition_mechanism(mechanism: Mechanism) -> Partition:
-    """The blocks of a mechanism, and its numbers. Raises NotPartitionable where it can only be solved as a whole,
-    BadInput and PointPlacementError for wrong arguments."""
+def partition_mechanism(mechanism: Mechanism) -> tuple[Structure, list[float]]:
+    """The structure of a mechanism, and its numbers (m, rad).
+
+    Raises NotPartitionable where it can only be solved as a whole, BadInput and PointPlacementError for wrong
+    arguments.
+    """
     try:
         return _partition(mechanism)
     except (KeyError, AttributeError):
@@ -117,7 +112,7 @@ def partition_mechanism(mechanism: Mechanism) -> Partition:
         raise NotPartitionable("something in it is not as its pairs expect it") from None
 
 
-def _partition(mechanism: Mechanism) -> Partition:
+def _partition(mechanism: Mechanism) -> tuple[Structure, list[float]]:
     numbers: list[float] = []
     shapes: dict[str, LinkShape] = {}
     point_names = [_read_points(link, numbers, shapes) for link in mechanism.links]
@@ -137,7 +132,7 @@ def _partition(mechanism: Mechanism) -> Partition:
         numbers += mechanism.pairs[k].measure([shapes[links[link]] for link in ends])
     for _, x, y in mechanism.sketch:
         numbers += (x, y)
-    return Partition(structure, numbers)
+    return structure, numbers
 
 
 def _read_points(link: Link, numbers: list[float], shapes: dict[str, LinkShape]) -> tuple[str, ...]:
@@ -448,8 +443,9 @@ class _Partitioner:
         rows.sort()
         given: list[int] = []
         numbers: list[int] = []
-        key, inputs = [], []
-        for number, here, inside, is_first, is_driven, k, other in rows:
+        pairs: list[BlockPair] = []
+        inputs: list[int] = []
+        for _, here, inside, is_first, is_driven, k, other in rows:
             there = inside
             if inside < 0:
                 there = FRAME_BODY if is_driven and other == self.frame else -1 - len(given)
@@ -457,12 +453,12 @@ class _Partitioner:
                     given.append(place[other])
             if is_driven:
                 inputs.append(1 + driven[k])
-            key.append((number, (here, there) if is_first else (there, here), is_driven))
+            pairs.append(BlockPair(self.pairs[k][0], (here, there) if is_first else (there, here), is_driven))
             is_exchanged = self.is_symmetric[k] and self.ends[k][0] != inner[here]
             own = self.pair_numbers[k]
             numbers += own[2:] + own[:2] if is_exchanged else own
         self._add_arms(inner, [row[-2] for row in rows])
-        block_type = _block_type((len(inner), len(given), tuple(key)), [self.pairs[row[-2]][0] for row in rows])
+        block_type = find_block_type(BlockSignature(len(inner), len(given), tuple(pairs)))
         if not block_type.is_square:
             raise NotPartitionable("constraints hold each other more than once")
         inner_places = range(self.place_count, self.place_count + len(inner))
@@ -480,18 +476,3 @@ class _Partitioner:
             if self.link_index[other] >= 0
         ]
         return len(pairs), sorted(pairs)
-
-
-_SignatureKey = tuple[int, int, tuple[tuple[int, tuple[int, int], bool], ...]]
-_block_types: dict[_SignatureKey, BlockType] = {}
-
-
-def _block_type(key: _SignatureKey, pair_types: Sequence[type[Pair]]) -> BlockType:
-    """The block type of a signature, whose key needs no hash of classes."""
-    if key not in _block_types:
-        if len(_block_types) >= MAX_BLOCK_TYPES:
-            _block_types.clear()
-        inner, given, rows = key
-        pairs = (BlockPair(each, *row[1:]) for each, row in zip(pair_types, rows, strict=True))
-        _block_types[key] = find_block_type(BlockSignature(inner, given, tuple(pairs)))
-    return _block_types[key]

@@ -173,23 +173,14 @@ SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
 
 
 class PinTape(NamedTuple):
-    """Steps of linkages, linkage after linkage, each after those that it needs: their `kinds` (see `PinStep`), the two
-    pins that each takes, `given` (steps, 2), and the one that it places (steps,), numbers p (steps, numbers), and the
-    two `bars` (steps, 2).
+    """The linkages that consist of a crank and dyads as a tape of steps, see `PinStep`.
 
-    Linkage k of `which` has the steps from first[k] to first[k + 1]; `tolerance` (linkages,) in sizes and least
-    `clearance` (linkages,). Pins and bars are numbered through all linkages.
+    Slots are the two pins that a step takes and the one that it places, `bars` (steps, 2) those that it uses. Pins and
+    bars are numbered through all linkages.
     """
 
-    which: IntArray
-    first: IntArray
-    kinds: IntArray
-    given: IntArray
-    placed: IntArray
-    p: Array
+    linkages: TapedLinkages
     bars: IntArray
-    tolerance: Array
-    clearance: Array
 
 
 class _Steps(NamedTuple):
@@ -229,12 +220,12 @@ def _make_tape(linkages: PinnedLinkages) -> PinTape:
         order = order[~odd[owner[order]]]
     first = np.zeros(len(which) + 1, dtype=np.int64)
     np.cumsum(np.bincount(owner, minlength=many)[which], out=first[1:])
-    given, bars = (np.stack([a[order], b[order]], axis=1) for a, b in (steps[1:3], steps[4:6]))
+    slots, bars = (np.stack([part[order] for part in parts], axis=1) for parts in (steps[1:4], steps[4:6]))
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
     clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
-    kinds, placed = steps.kinds[order], steps.placed[order]
-    return PinTape(which, first, kinds, given, placed, p[order], bars, tolerance, clearance)
+    blocks = np.arange(len(order))
+    return PinTape(TapedLinkages(which, first, steps.kinds[order], slots, p[order], blocks, tolerance, clearance), bars)
 
 
 def _find_steps(
@@ -399,18 +390,14 @@ def run_pins(
     `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
     that linkages share.
     """
-    tape, rates = pin_tape(linkages), values.shape[1] == POINT_ROWS[True]
+    taped, rates = pin_tape(linkages).linkages, values.shape[1] == POINT_ROWS[True]
     slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
     slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
     pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
     slots[pins] = rows
-    block_slots = np.empty((len(tape.placed), 3), dtype=np.int64)
-    block_slots[:, :2], block_slots[:, 2] = slots[tape.given], slots[tape.placed]
-    block_slots[tape.kinds == PinStep.CRANK, 0] = TABLE
-    blocks = np.arange(len(block_slots))
-    taped = TapedLinkages(
-        numbers[tape.which], tape.first, tape.kinds, block_slots, tape.p, blocks, tape.tolerance, tape.clearance
-    )
+    block_slots = slots[taped.slots]
+    block_slots[taped.kinds == PinStep.CRANK, 0] = TABLE
+    taped = taped._replace(which=numbers[taped.which], slots=block_slots)
     kinds = BlockKinds(
         lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
     )

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, clear_rows, padded_steps, run_tape
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, padded_steps, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 
@@ -161,14 +161,8 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
 
 def clear_points(values: Array, first: IntArray, which: IntArray, first_step: IntArray) -> None:
     """Set the points of linkages, of linkage k from first[k] to first[k + 1], to NaN from a step of each on."""
-    if not len(which):
-        return
-    counts = np.diff(first)[which]
-    begin = np.cumsum(counts) - counts
-    points = np.repeat(first[which] - begin, counts) + np.arange(counts.sum())
-    steps = np.repeat(first_step, counts)
-    rows = values.ctypes.data + points[:, None] * values.strides[0] + np.arange(values.shape[1]) * values.strides[1]
-    clear_rows(rows.ravel(), np.repeat(steps, values.shape[1]), values.shape[2])
+    for begin, end, step in zip(first[which].tolist(), first[which + 1].tolist(), first_step.tolist(), strict=True):
+        values[begin:end, :, step:] = np.nan
 
 
 def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divided: bool) -> Iterator[IntArray]:

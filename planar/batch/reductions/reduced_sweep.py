@@ -273,7 +273,7 @@ def sweep_reduced(
         blocks.append(block)
         missing -= there
         done += len(block.status)
-        runs.tell(done, max(done, length_hint(mechanisms, 0)))
+        runs.report(done, max(done, length_hint(mechanisms, 0)))
     reason = time_is_over() if taken > len(blocks) else ""
     if reason and not blocks:
         raise interrupted(reason, "before a mechanism was reduced")
