@@ -1,4 +1,4 @@
-"""All positions of linkages that are partitioned into blocks: inputs, blocks and points of each on one tape."""
+"""Run linkages that are partitioned into blocks: inputs, blocks and points of a linkage are blocks of one tape."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from planar.batch.mechanisms.block_type import (
     Y,
     write_formula,
 )
-from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies, find_linkage_assemblies
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays, SweepRequest, watched_links
-from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
+from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, find_linkage_assemblies
+from planar.batch.mechanisms.linkages import LinkageArrays, PointArrays, SweepRequest, watched_links
+from planar.batch.mechanisms.newton_march import compile_newton_block, step_table
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
@@ -67,14 +67,14 @@ def run_blocks(arrays: LinkageArrays, points: PointTable, values: Array, run: Pa
 
     Behind these rows are those of the points of links that decide where pairs with stops are.
     """
-    start = find_linkage_assemblies(arrays)
+    is_sure, block_numbers = find_linkage_assemblies(arrays)
     results = arrays.points([points.names(k) for k in arrays.which.tolist()])
     first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
     rows = np.arange(len(results.owner)) + (points.first[arrays.which] - first_result[:-1])[results.owner]
     watched = arrays.watched_points
     first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
     rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
-    taped = _make_tape(arrays, start, results.followed_by(watched), rows).select(np.flatnonzero(start.is_sure))
+    taped = _make_tape(arrays, block_numbers, results.followed_by(watched), rows).select(np.flatnonzero(is_sure))
     find_endings = {
         int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
@@ -102,7 +102,7 @@ def _find_ending(
         for pair, pair_is_long in zip(stops.pairs, is_long.tolist(), strict=True)
     ):
         return None
-    positions = arrays.start[k] + run.turned
+    positions = arrays.start[k] + run.rotation
     u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[: run.good, None]
     places = np.moveaxis(run.places(rows)[..., : run.good], 1, 2)[:, None, :, :, None]
     points = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
@@ -139,7 +139,9 @@ def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageE
     return LinkageEnding(first, Outcome.STOP, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units))
 
 
-def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArrays, rows: IntArray) -> TapedLinkages:
+def _make_tape(
+    arrays: LinkageArrays, block_numbers: Sequence[Array], points: PointArrays, rows: IntArray
+) -> TapedLinkages:
     """The tape of all linkages: the inputs of a linkage, then its blocks, then its points, each to its row."""
     linkage_count, inputs = len(arrays), arrays.inputs
     block_owner = np.repeat(np.arange(linkage_count), np.diff(arrays.first_block))
@@ -150,9 +152,8 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArray
     position = np.empty_like(order)
     position[order] = np.arange(len(order))
     at_input, at_block, at_point = np.split(position, np.cumsum([len(owner) for owner in owners])[:-1])
-    numbers = [_block_numbers(batch, start) for batch in arrays.batches]
     slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
-    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in numbers))))
+    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in block_numbers))))
     kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
     kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
     p[at_input, :INPUT_NUMBERS] = np.stack(
@@ -162,7 +163,7 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArray
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), rows
     blocks[at_block] = np.arange(arrays.block_count)
-    for number, (batch, values) in enumerate(zip(arrays.batches, numbers, strict=True)):
+    for number, (batch, values) in enumerate(zip(arrays.batches, block_numbers, strict=True)):
         indices, kind = at_block[batch.block_numbers], batch.block_type
         kinds[indices] = FIRST_BLOCK_TYPE + number
         slots[indices, : kind.slot_count], slots[indices, kind.slot_count] = (
@@ -176,14 +177,6 @@ def _make_tape(arrays: LinkageArrays, start: StartAssemblies, points: PointArray
 
 def _slot_numbers(link_indices: IntArray) -> IntArray:
     return np.where(link_indices > 0, FIRST_ROOM_SLOT + 1 - link_indices, FRAME)
-
-
-def _block_numbers(batch: BlockBatch, start: StartAssemblies) -> Array:
-    """The numbers of blocks as the functions of their kind take them."""
-    kind = batch.block_type
-    if kind.has_closed_form:
-        return np.hstack([batch.p, start.signs[batch.block_numbers, : kind.sign_count]])
-    return newton_numbers(kind, batch.p, start.z[batch.block_numbers, : len(kind.unknown_is_angle)])
 
 
 def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
@@ -211,8 +204,8 @@ def _pose_rows(rates: bool) -> int:
 
 @lru_cache
 def input_formula(is_running: bool, rates: bool) -> TapeFormula:
-    """The position of an input, cosine and sine of it, and its rates, from its numbers and how far inputs have
-    turned."""
+    """The position of an input, cosine and sine of it, and its rates, from its numbers and the rotation of
+    the inputs."""
 
     def write(table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
         if is_running:
@@ -230,7 +223,7 @@ def input_formula(is_running: bool, rates: bool) -> TapeFormula:
 def point_formula(rates: bool) -> TapeFormula:
     """x and y of a point, then of its first and second rates, from its link's pose and rates.
 
-    Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
+    Numbers: the point in its link (m), then the unit of lengths of the linkage (m).
     """
 
     def write(link: ca.SX, numbers: ca.SX) -> list[ca.SX]:

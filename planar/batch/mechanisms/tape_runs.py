@@ -93,7 +93,7 @@ class FineRun(NamedTuple):
     function that returns x and y of result points (points, 2, steps)."""
 
     good: int
-    turned: Array
+    rotation: Array
     places: Callable[[IntArray], Array]
 
 
@@ -146,7 +146,7 @@ def run_taped_linkages(
 
 
 def step_division(steps: int) -> int:
-    """Into how many a step is divided."""
+    """The number of parts into which a step is divided."""
     return ceil(FULL_TURN / steps / LONGEST_INPUT_STEP)
 
 
@@ -186,7 +186,7 @@ class _AttemptRun:
     def __init__(self, taped: TapedLinkages, kinds: BlockKinds, polished: bool, values: Array, steps: int, finer: int):
         self.taped, self.finer, self.count = taped, finer, steps * finer + 1
         stride = padded_steps(self.count)
-        self.turned = np.arange(stride) * (FULL_TURN / (self.count - 1))
+        self.rotation = np.arange(stride) * (FULL_TURN / (self.count - 1))
         self.rows: IntArray | None = None
         refs, points = taped.slots, values
         if finer > 1:
@@ -196,7 +196,7 @@ class _AttemptRun:
             refs[is_result] = places
         self.points = points
         room = np.empty((max(-int(refs.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
-        room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.turned), np.sin(self.turned), self.turned
+        room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.rotation), np.sin(self.rotation), self.rotation
         if kinds.frame_rows:
             room[-1 - FRAME] = 0.0
             for row, value in kinds.frame_rows.items():
@@ -227,11 +227,11 @@ class _AttemptRun:
         run.solved[which[is_sure]] = (good_counts[is_sure] - 1) // self.finer + 1
         good, dead = good_counts[is_dead], which[is_dead]
         run.outcome[dead], run.block[dead] = DEAD_POINT_NUMBER, self.taped.blocks[last_blocks[is_dead]]
-        run.near[dead] = np.stack([self.turned[good - 1], self.turned[good]], axis=1)
+        run.near[dead] = np.stack([self.rotation[good - 1], self.rotation[good]], axis=1)
         for k, number in enumerate(which.tolist()) if find_endings else ():
             if number not in find_endings or not good_counts[k]:
                 continue
-            ending = find_endings[number](FineRun(int(good_counts[k]), self.turned[: self.count], self._places))
+            ending = find_endings[number](FineRun(int(good_counts[k]), self.rotation[: self.count], self._places))
             run.is_decided[number] = ending is not None
             if ending is not None:
                 run.solved[number] = (ending.solved_steps - 1) // self.finer + 1
