@@ -76,13 +76,13 @@ def pin_formulas(rates: bool, polished: bool) -> tuple[TapeFormula, ...]:
     return tuple(made)
 
 
-def _turned(x: ca.SX) -> ca.SX:
-    """By a right angle."""
+def _quarter_turn(x: ca.SX) -> ca.SX:
+    """A vector rotated by a right angle."""
     return ca.vertcat(-x[1], x[0])
 
 
 def _orders(pin: ca.SX, rates: bool) -> list[ca.SX]:
-    """Place, velocity and acceleration of a pin; one that has no rates stands."""
+    """Place, velocity and acceleration of a pin; without rates it stands still."""
     order_count = POINT_ROWS[rates] // 2
     return [pin[2 * k : 2 * k + 2] if 2 * k < pin.numel() else ca.SX.zeros(2) for k in range(order_count)]
 
@@ -90,23 +90,23 @@ def _orders(pin: ca.SX, rates: bool) -> list[ca.SX]:
 def _crank(rates: bool, table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
     """Rows of a pin on the crank."""
     pivot, pin, velocity, acceleration = numbers[:2], numbers[2:4], numbers[4], numbers[5]
-    arm = table[0] * pin + table[1] * _turned(pin)
+    arm = table[0] * pin + table[1] * _quarter_turn(pin)
     if not rates:
         return [pivot + arm]
-    return [pivot + arm, velocity * _turned(arm), acceleration * _turned(arm) - velocity**2 * arm]
+    return [pivot + arm, velocity * _quarter_turn(arm), acceleration * _quarter_turn(arm) - velocity**2 * arm]
 
 
 def _carried(rates: bool, first: ca.SX, second: ca.SX, numbers: ca.SX) -> list[ca.SX]:
     """Rows of a pin on a bar: linear in those of two others."""
-    both = zip(_orders(first, rates), _orders(second, rates), strict=True)
-    return [a + numbers[0] * (b - a) + numbers[1] * _turned(b - a) for a, b in both]
+    pairs = zip(_orders(first, rates), _orders(second, rates), strict=True)
+    return [a + numbers[0] * (b - a) + numbers[1] * _quarter_turn(b - a) for a, b in pairs]
 
 
 def _dyad(rates: bool, polished: bool, first: ca.SX, second: ca.SX, numbers: ca.SX) -> list[ca.SX]:
-    """Rows of the pin between two bars, these as vectors with their squared lengths, by how much of the size the
-    distances are off, and how clear they are of where two ways to assemble them meet: the squared sine between them.
+    """Rows of the pin between two bars, these as vectors with their squared lengths, the error of the
+    distances (sizes), and the distance measure from a dead point: the squared sine between the bars.
 
-    The pin is where two circles about the given ones meet.
+    The pin is an intersection of two circles about the other pins.
     """
     (a, *a_rates), (b, *b_rates) = _orders(first, rates), _orders(second, rates)
     lengths, sign, per_size = numbers[:2], numbers[2], numbers[3]
@@ -115,25 +115,25 @@ def _dyad(rates: bool, polished: bool, first: ca.SX, second: ca.SX, numbers: ca.
     scale = 0.5 / distance
     height = (ca.sum1(lengths) ** 2 - distance) * (distance - (lengths[0] - lengths[1]) ** 2)
     along, across = 0.5 + scale * (squares[0] - squares[1]), scale * (sign * ca.sqrt(height))
-    pin = a + along * between + across * _turned(between)
+    pin = a + along * between + across * _quarter_turn(between)
     if polished:
         bars, off = _bars(pin, (a, b), squares)
         pin -= _solve(bars, 0.5 * off)
     bars, off = _bars(pin, (a, b), squares)
     rows = [pin]
     if rates:
-        # what keeps a distance: bar * (pin' - given') = 0, and once more by time
+        # the derivative of a distance that is constant: bar * (pin' - other') = 0, then its derivative
         velocity = _solve(bars, _dots(bars, ca.horzcat(a_rates[0], b_rates[0]).T))
         relative = ca.horzcat(velocity - a_rates[0], velocity - b_rates[0]).T
         acceleration = _solve(bars, _dots(bars, ca.horzcat(a_rates[1], b_rates[1]).T) - _dots(relative, relative))
         rows += [velocity, acceleration]
-    open_ = ca.sum1(ca.fabs(off) * (0.5 * per_size / lengths))
+    error = ca.sum1(ca.fabs(off) * (0.5 * per_size / lengths))
     directions = [part for k in range(2) for part in (bars[k, 0], bars[k, 1], squares[k])]
-    return [*rows, *directions, open_, height * (0.25 / (squares[0] * squares[1]))]
+    return [*rows, *directions, error, height * (0.25 / (squares[0] * squares[1]))]
 
 
 def _bars(pin: ca.SX, given_pins: Sequence[ca.SX], squares: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The vectors from given pins to one, row by row, and by how much their squared lengths are off."""
+    """The vectors from given pins to one, row by row, and the errors of their squared lengths."""
     bars = ca.horzcat(*(pin - given_pin for given_pin in given_pins)).T
     return bars, bars[:, 0] ** 2 - squares + bars[:, 1] ** 2
 
@@ -142,10 +142,11 @@ def _dots(bars: ca.SX, others: ca.SX) -> ca.SX:
     return bars[:, 0] * others[:, 0] + bars[:, 1] * others[:, 1]
 
 
-def _solve(bars: ca.SX, of: ca.SX) -> ca.SX:
-    """The vector whose products with two bars are so."""
+def _solve(bars: ca.SX, products: ca.SX) -> ca.SX:
+    """The vector with these scalar products with two bars."""
     scale = 1.0 / (bars[0, 0] * bars[1, 1] - bars[0, 1] * bars[1, 0])
-    x, y = of[0] * bars[1, 1] - of[1] * bars[0, 1], of[1] * bars[0, 0] - of[0] * bars[1, 0]
+    x = products[0] * bars[1, 1] - products[1] * bars[0, 1]
+    y = products[1] * bars[0, 0] - products[0] * bars[1, 0]
     return ca.vertcat(scale * x, scale * y)
 
 
@@ -195,31 +196,32 @@ class _Steps(NamedTuple):
 
 
 def _make_tape(linkages: PinnedLinkages) -> PinTape:
-    """The steps of those linkages that consist of a crank and dyads whose assembly is surely that of their places."""
-    many, bar_counts = len(linkages), np.diff(linkages.first_bar)
-    bar_owner = np.repeat(np.arange(many), bar_counts)
-    pin_owner = np.repeat(np.arange(many), np.diff(linkages.first_pin))
+    """Make the tape of the linkages that consist of a crank and dyads, if their assembly is surely that of their pins'
+    places."""
+    count, bar_counts = len(linkages), np.diff(linkages.first_bar)
+    bar_owner = np.repeat(np.arange(count), bar_counts)
+    pin_owner = np.repeat(np.arange(count), np.diff(linkages.first_pin))
     entry_bar = np.repeat(np.arange(len(bar_owner)), np.diff(linkages.first_entry))
     entry_pin = linkages.bar_pins + linkages.first_pin[bar_owner[entry_bar]]
     is_fixed = np.zeros(len(pin_owner), dtype=bool)
     is_fixed[frame_pins(linkages)] = True
-    # of the pairs of a pin one less than of the links on it
+    # a pin of n links has n - 1 pairs
     pairs = np.diff(linkages.first_entry[linkages.first_bar]) - np.diff(linkages.first_pin)
     pairs += np.diff(linkages.first_frame_pin)
     steps, known = _find_steps(linkages, entry_bar, entry_pin, is_fixed)
     unit, reach = _sizes(linkages, entry_bar, entry_pin)
-    odd = 2 * pairs + 1 != 3 * bar_counts
-    odd |= ~((unit > SMALLEST_SIZE) & (unit < LARGEST_SIZE))
-    odd[pin_owner[~known]] = True
+    is_other = 2 * pairs + 1 != 3 * bar_counts
+    is_other |= ~((unit > SMALLEST_SIZE) & (unit < LARGEST_SIZE))
+    is_other[pin_owner[~known]] = True
     p, arm = _numbers(linkages, steps, pin_owner, unit, is_fixed)
     owner = pin_owner[steps.placed]
-    odd[owner[arm < SHORT_ARM]] = True
-    which = np.flatnonzero(~odd)
+    is_other[owner[arm < SHORT_ARM]] = True
+    which = np.flatnonzero(~is_other)
     order = _stable_order(owner)
-    if len(which) < many:
-        order = order[~odd[owner[order]]]
+    if len(which) < count:
+        order = order[~is_other[owner[order]]]
     first = np.zeros(len(which) + 1, dtype=np.int64)
-    np.cumsum(np.bincount(owner, minlength=many)[which], out=first[1:])
+    np.cumsum(np.bincount(owner, minlength=count)[which], out=first[1:])
     slots, bars = (np.stack([part[order] for part in parts], axis=1) for parts in (steps[1:4], steps[4:6]))
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
@@ -231,49 +233,51 @@ def _make_tape(linkages: PinnedLinkages) -> PinTape:
 def _find_steps(
     linkages: PinnedLinkages, entry_bar: IntArray, entry_pin: IntArray, is_fixed: BoolArray
 ) -> tuple[_Steps, BoolArray]:
-    """The steps that follow at once from known pins, level after level, and which pins (pins,) are known in the end.
+    """Find the steps that follow from known pins, level after level, and which pins (pins,) are known in the end.
 
-    A pin that two known ones hold is carried, where these are of one bar, else the pin of a dyad. Where as many
-    constraints hold a linkage as it has freedoms, and all its pins are known, none of them is held by more.
+    A pin beside two known ones is carried if these are on one bar, else it is the pin of a dyad. If a linkage has as
+    many constraints as freedoms, and all its pins are known, no pin is constrained twice.
     """
     crank = linkages.first_bar[:-1] + linkages.crank
     driven = np.zeros(linkages.first_bar[-1], dtype=bool)
     driven[crank] = True
     known = is_fixed.copy()
     on_crank = np.flatnonzero(driven[entry_bar])
-    at, of = entry_pin[on_crank], entry_bar[on_crank]
+    crank_pins, crank_bars = entry_pin[on_crank], entry_bar[on_crank]
     pivot = np.zeros(len(driven), dtype=np.int64)
-    pivot[of[is_fixed[at]]] = at[is_fixed[at]]
-    at, of = at[~is_fixed[at]], of[~is_fixed[at]]
-    known[at] = True
-    levels, on_cranks = [(pivot[of], pivot[of], at, of, of)], slice(0, len(of))
+    is_pivot = is_fixed[crank_pins]
+    pivot[crank_bars[is_pivot]] = crank_pins[is_pivot]
+    crank_pins, crank_bars = crank_pins[~is_pivot], crank_bars[~is_pivot]
+    known[crank_pins] = True
+    levels = [(pivot[crank_bars], pivot[crank_bars], crank_pins, crank_bars, crank_bars)]
+    on_cranks = slice(0, len(crank_bars))
     pin, other, bar = _pairs_on_bars(linkages, entry_bar, entry_pin)
     counts_of = np.bincount(pin, minlength=len(known))
     starts = counts_of.cumsum() - counts_of
-    held_count, earlier_pin, earlier_bar = (np.zeros(len(known), dtype=np.int64) for _ in range(3))
+    known_count, earlier_pin, earlier_bar = (np.zeros(len(known), dtype=np.int64) for _ in range(3))
     newly_known = np.flatnonzero(known)
     while len(newly_known):
-        # the pins beside those of the level before, once for each pin that holds it
+        # the pins beside those of the level before, once for each pair of pins
         counts = counts_of[newly_known]
         stops = counts.cumsum()
-        own = np.arange(stops[-1]) + (starts[newly_known] + counts - stops).repeat(counts)
-        held = other[own]
-        (rest,) = (~known[held]).nonzero()
-        rest = rest[_stable_order(held[rest])]
-        held, by, on = held[rest], pin[own[rest]], bar[own[rest]]
-        is_first = np.ones(len(held), dtype=bool)
-        np.not_equal(held[1:], held[:-1], out=is_first[1:])
+        entries = np.arange(stops[-1]) + (starts[newly_known] + counts - stops).repeat(counts)
+        beside = other[entries]
+        (rest,) = (~known[beside]).nonzero()
+        rest = rest[_stable_order(beside[rest])]
+        beside, by, on = beside[rest], pin[entries[rest]], bar[entries[rest]]
+        is_first = np.ones(len(beside), dtype=bool)
+        np.not_equal(beside[1:], beside[:-1], out=is_first[1:])
         (begins,) = is_first.nonzero()
-        held = held[begins]
+        beside = beside[begins]
         times = np.empty_like(begins)
         times[:-1], times[-1:] = begins[1:] - begins[:-1], len(by) - begins[-1:]
-        held_count[held] += times
-        (of_two,) = (held_count[held] == 2).nonzero()
-        placed, begin = held[of_two], begins[of_two]
-        is_alone = times[of_two] == 1  # beside one of an earlier level
+        known_count[beside] += times
+        (is_placed,) = (known_count[beside] == 2).nonzero()
+        placed, begin = beside[is_placed], begins[is_placed]
+        is_alone = times[is_placed] == 1  # beside one of an earlier level
         second = begin + 1 - is_alone
         one_pin, one_bar = np.where(is_alone, (earlier_pin[placed], earlier_bar[placed]), (by[begin], on[begin]))
-        earlier_pin[held], earlier_bar[held] = by[begins], on[begins]
+        earlier_pin[beside], earlier_bar[beside] = by[begins], on[begins]
         known[placed] = True
         newly_known = placed
         if len(placed):
@@ -293,20 +297,20 @@ def _pairs_on_bars(
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Every pin with every other on the same bar, sorted by the first: both, and the bar."""
     sizes, starts = np.diff(linkages.first_entry), linkages.first_entry[:-1]
-    own, of, bar = [], [], []
+    pins, others, bars = [], [], []
     place, size, begin = np.arange(len(entry_bar)) - starts[entry_bar], sizes[entry_bar], starts[entry_bar]
     for step in range(1, int(sizes.max())):
-        there = slice(None) if sizes.min() > step else np.flatnonzero(size > step)
-        own.append(entry_pin[there])
-        of.append(entry_pin[begin[there] + (place[there] + step) % size[there]])
-        bar.append(entry_bar[there])
-    pin, other, bars = (np.concatenate(parts) for parts in (own, of, bar))
+        entries = slice(None) if sizes.min() > step else np.flatnonzero(size > step)
+        pins.append(entry_pin[entries])
+        others.append(entry_pin[begin[entries] + (place[entries] + step) % size[entries]])
+        bars.append(entry_bar[entries])
+    pin, other, bar = (np.concatenate(parts) for parts in (pins, others, bars))
     order = _stable_order(pin)
-    return pin[order], other[order], bars[order]
+    return pin[order], other[order], bar[order]
 
 
 def _stable_order(numbers: IntArray) -> IntArray:
-    """The order of whole numbers from zero on, alike ones as they stand: short ones are counted, not compared."""
+    """The stable order of integers from zero on: numpy counts short integers, and compares others."""
     is_short = len(numbers) and numbers.max() <= np.iinfo(np.uint16).max
     return np.argsort(numbers.astype(np.uint16) if is_short else numbers, kind="stable")
 
@@ -314,51 +318,52 @@ def _stable_order(numbers: IntArray) -> IntArray:
 def _numbers(
     linkages: PinnedLinkages, steps: _Steps, pin_owner: IntArray, unit: Array, is_fixed: BoolArray
 ) -> tuple[Array, Array]:
-    """The numbers of steps (steps, numbers), and the shortest bar of dyads (steps,) in sizes; zero for what is not
-    sure."""
+    """The numbers of steps (steps, numbers), and the shortest bar of dyads (steps,) in sizes; zero if the assembly
+    is not sure."""
     x, y = linkages.positions.T.copy()
-    (ax, ay), (bx, by), (px, py) = ((x[each], y[each]) for each in (steps.first, steps.second, steps.placed))
+    (ax, ay), (bx, by), (px, py) = ((x[pins], y[pins]) for pins in (steps.first, steps.second, steps.placed))
     tox, toy, farx, fary = px - ax, py - ay, bx - ax, by - ay
     across, square = farx * toy - fary * tox, farx * farx + fary * fary
     p = np.empty((NUMBERS, len(px)))
     size = unit[pin_owner[steps.placed]]
     with np.errstate(all="ignore"):
-        one, two = np.sqrt(tox * tox + toy * toy), np.sqrt((px - bx) ** 2 + (py - by) ** 2)
-        p[:] = one, two, np.sign(across), 1.0 / size, bx, by
-        # the other assembly has the pin on the other side of the line through those that are given
-        sure = is_surely_farther(4.0 * across * across / (square * size * size), np.zeros(1), roundings=2)
-        arm = np.where(sure & ~is_fixed[steps.first], np.minimum(one, two) / size, 0.0)
-        own = np.flatnonzero(steps.kinds >= PinStep.CARRIED)
-        p[0, own], p[1, own] = ((farx * tox + fary * toy) / square)[own], (across / square)[own]
-        p[2, own], p[3, own], arm[own] = bx[own], by[own], np.where(is_fixed[steps.first[own]], 0.0, np.inf)
-    own = np.flatnonzero(steps.kinds == PinStep.CRANK)
-    owner = pin_owner[steps.placed[own]]
-    for row, of in enumerate((ax, ay, tox, toy)):
-        p[row, own] = of[own]
-    p[4, own], p[5, own], arm[own] = linkages.velocity[owner], linkages.acceleration[owner], np.inf
+        first_length, second_length = np.sqrt(tox * tox + toy * toy), np.sqrt((px - bx) ** 2 + (py - by) ** 2)
+        p[:] = first_length, second_length, np.sign(across), 1.0 / size, bx, by
+        # the other assembly has the pin on the other side of the line through the first two
+        is_sure = is_surely_farther(4.0 * across * across / (square * size * size), np.zeros(1), roundings=2)
+        arm = np.where(is_sure & ~is_fixed[steps.first], np.minimum(first_length, second_length) / size, 0.0)
+        carried = np.flatnonzero(steps.kinds >= PinStep.CARRIED)
+        p[0, carried], p[1, carried] = ((farx * tox + fary * toy) / square)[carried], (across / square)[carried]
+        p[2, carried], p[3, carried] = bx[carried], by[carried]
+        arm[carried] = np.where(is_fixed[steps.first[carried]], 0.0, np.inf)
+    cranks = np.flatnonzero(steps.kinds == PinStep.CRANK)
+    owner = pin_owner[steps.placed[cranks]]
+    for row, values in enumerate((ax, ay, tox, toy)):
+        p[row, cranks] = values[cranks]
+    p[4, cranks], p[5, cranks], arm[cranks] = linkages.velocity[owner], linkages.acceleration[owner], np.inf
     return p.T.copy(), np.nan_to_num(arm, nan=0.0, posinf=np.inf)
 
 
 def _sizes(linkages: PinnedLinkages, entry_bar: IntArray, entry_pin: IntArray) -> tuple[Array, Array]:
-    """The greatest extent of a link of each linkage, and how far its numbers reach (m)."""
+    """The greatest extent of a link of each linkage, and its greatest coordinate (m)."""
     starts, frames = linkages.first_entry[:-1], linkages.first_frame_pin[:-1]
-    at, first, fixed = linkages.positions.T.copy(), entry_pin[starts], frame_pins(linkages)
-    base = [each[first] for each in at]
-    way = [each[entry_pin[starts + 1]] - begin for each, begin in zip(at, base, strict=True)]
-    length = np.sqrt(way[0] ** 2 + way[1] ** 2)
+    xy, first, fixed = linkages.positions.T.copy(), entry_pin[starts], frame_pins(linkages)
+    base = [coordinates[first] for coordinates in xy]
+    axis = [coordinates[entry_pin[starts + 1]] - begin for coordinates, begin in zip(xy, base, strict=True)]
+    length = np.sqrt(axis[0] ** 2 + axis[1] ** 2)
     extents, reaches = length, length
     if len(entry_bar) > 2 * len(starts):
-        c, s = ((each / length)[entry_bar] for each in way)
-        x, y = (each[entry_pin] - begin[entry_bar] for each, begin in zip(at, base, strict=True))
+        c, s = ((part / length)[entry_bar] for part in axis)
+        x, y = (coordinates[entry_pin] - begin[entry_bar] for coordinates, begin in zip(xy, base, strict=True))
         extents, reaches = _extents((c * x + s * y, c * y - s * x), starts)
-    (extent, reach), heads = _extents([each[fixed] for each in at], frames), linkages.first_bar[:-1]
+    (extent, reach), heads = _extents([coordinates[fixed] for coordinates in xy], frames), linkages.first_bar[:-1]
     unit = np.maximum(np.maximum.reduceat(extents, heads), extent)
     return unit, np.maximum(np.maximum.reduceat(reaches, heads), reach)
 
 
 def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
-    """Of the boxes around points x, y (points,), part by part: the diagonals, and the greatest number (parts,)."""
-    bounds = [(np.minimum.reduceat(each, starts), np.maximum.reduceat(each, starts)) for each in points]
+    """The diagonals of the boxes around points x, y (points,), part by part, and the greatest coordinate (parts,)."""
+    bounds = [(np.minimum.reduceat(part, starts), np.maximum.reduceat(part, starts)) for part in points]
     (left, right), (low, high) = bounds
     wide, tall = right - left, high - low
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
