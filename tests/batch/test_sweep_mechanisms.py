@@ -424,6 +424,22 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
         partition_mechanism(MODELS["three-parallel-cranks"])
 
 
+def test_mechanisms_of_one_structure_share_it_and_differ_in_their_numbers(monkeypatch):
+    mechanisms = [four_bar(*ROCKER, 0.8), four_bar(*(1.1 * length for length in ROCKER), 0.7)]
+    (structure, numbers), (other_structure, other_numbers) = map(partition_mechanism, mechanisms)
+    assert structure is other_structure
+    assert numbers != other_numbers
+    undriven = replace(mechanisms[0], inputs=(), sketch=())
+    with pytest.raises(NotPartitionable, match="free"):
+        partition_mechanism(undriven)
+    together = planar.sweep_each(mechanisms, 24)
+    for mechanism, found in zip(mechanisms, together, strict=True):
+        monkeypatch.setattr(partition, "_structures", {})
+        (alone,) = planar.sweep_each([mechanism], 24)
+        for name, values in found.acceleration.items():
+            np.testing.assert_array_equal(values, alone.acceleration[name])
+
+
 DYADS = ("TTT", "TTS", "TST", "STS", "SST", "TSS")
 
 

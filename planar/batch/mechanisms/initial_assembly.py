@@ -278,12 +278,11 @@ def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None
 
 
 def _sketch_sums(points: PointArrays, first: IntArray) -> Array:
-    """The sums of points of every place (places, STATISTICS)."""
+    """The sums of the points of every place (places, SKETCH_SUMS)."""
     px, py, tx, ty = points.numbers.T
     along, across = px * tx + py * ty, px * ty - py * tx
     squares = px * px + py * py + tx * tx + ty * ty
-    where = first[points.owner] + points.link_index
-    parts = (np.ones_like(px), px, py, tx, ty, along, across, squares)
-    stats = [np.bincount(where, part, 1 + first[-1]) for part in parts]
-    assert len(stats) == SKETCH_SUMS
-    return np.stack(stats, axis=1)
+    terms = np.array([np.ones_like(px), px, py, tx, ty, along, across, squares])
+    bins = (first[points.owner] + points.link_index) * SKETCH_SUMS + np.arange(SKETCH_SUMS)[:, None]
+    sums: Array = np.bincount(bins.ravel(), terms.ravel(), (1 + first[-1]) * SKETCH_SUMS)
+    return sums.reshape(-1, SKETCH_SUMS)

@@ -126,15 +126,15 @@ class LinkageArrays:
         owner, point = _concatenate([np.array(part, dtype=np.int64) for part in parts])
         link_index = np.concatenate([one.point_places[part] for one, part in zip(self.structures, parts, strict=True)])
         first = 2 * point + self.first_number[owner]
-        return PointArrays(owner, link_index, np.stack([self.numbers[first], self.numbers[first + 1]], axis=1))
+        return PointArrays(owner, link_index, np.array([self.numbers[first], self.numbers[first + 1]]).T)
 
     def sketch_points(self, layouts: Sequence[PointLayout]) -> PointArrays:
         """Points of every linkage by a layout of its structure: x and y in the link, and in the world (sizes)."""
         owner, link_index = _concatenate([layout.link_index for layout in layouts])
         places = (np.concatenate(parts) for parts in zip(*(layout[1:] for layout in layouts), strict=True))
         first = [part + self.first_number[owner] for part in places]
-        coordinates = np.stack([self.numbers[row + part] for row in first for part in (0, 1)], axis=1)
-        return PointArrays(owner, link_index, coordinates / self.unit[owner][:, None])
+        coordinates = np.array([self.numbers[row + part] for row in first for part in (0, 1)])
+        return PointArrays(owner, link_index, (coordinates / self.unit[owner]).T)
 
     def links_of_block(self, number: int) -> str:
         """The names of the inner links of a block."""
