@@ -284,5 +284,5 @@ def _sketch_sums(points: PointArrays, first: IntArray) -> Array:
     squares = px * px + py * py + tx * tx + ty * ty
     terms = np.array([np.ones_like(px), px, py, tx, ty, along, across, squares])
     bins = (first[points.owner] + points.link_index) * SKETCH_SUMS + np.arange(SKETCH_SUMS)[:, None]
-    sums: Array = np.bincount(bins.ravel(), terms.ravel(), (1 + first[-1]) * SKETCH_SUMS)
-    return sums.reshape(-1, SKETCH_SUMS)
+    sums = np.bincount(bins.ravel(), terms.ravel(), (1 + first[-1]) * SKETCH_SUMS)
+    return np.asarray(sums.reshape(-1, SKETCH_SUMS), dtype=float)
