@@ -1,4 +1,4 @@
-"""Tasks side by side: in threads of this process, or given to an executor, which may lose them."""
+"""Run tasks side by side: in threads of this process, or by an executor, which may lose them."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 MAX_EXECUTOR_TRIES = 2
-"""How often a task is given to an executor before it is done here."""
+"""How often a task is submitted to an executor before this process runs it."""
 TASKS_PER_WORKER = 2
-"""Tasks in the hands of an executor, or of threads, for each of its workers."""
+"""Tasks that are submitted to an executor, or to threads, for each worker."""
 
 
 def usable_cores() -> int:
-    """How many cores this process may use."""
+    """The number of cores that this process may use."""
     try:
         return max(1, len(os.sched_getaffinity(0)))
-    except AttributeError:  # not every system tells
+    except AttributeError:  # not on every system
         return max(1, os.cpu_count() or 1)
 
 
 def thread_count(workers: int | None, executor: Executor | None) -> int:
-    """How many threads solve: as many as there are cores where `workers` is None. Raises BadInput."""
+    """The number of threads that solve: that of cores if `workers` is None. Raises BadInput."""
     if workers is None:
         return 1 if executor is not None else usable_cores()
     if isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1:
@@ -43,21 +43,21 @@ def thread_count(workers: int | None, executor: Executor | None) -> int:
 
 
 def worker_count(executor: Executor) -> int:
-    """How many tasks an executor does at once."""
+    """The number of tasks that an executor runs at once."""
     return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
 
 
 def run_in_threads(
     threads: int, tasks: Iterable[tuple[int, Task]], function: Callable[[int, Task], Result]
 ) -> Iterator[tuple[int, Result]]:
-    """The results of numbered tasks as they come, each by its number; tasks are taken when a thread is free for them.
+    """Yield the numbers and results of tasks as they come; tasks are taken when a thread is free.
 
-    Whatever a task raises is raised here.
+    Exceptions of tasks are raised.
     """
     waiting = iter(tasks)
     first_tasks = list(islice(waiting, 2 if threads > 1 else 0))
     waiting = chain(first_tasks, waiting)
-    if len(first_tasks) < 2:  # one task needs no thread of its own
+    if len(first_tasks) < 2:  # one task needs no other thread
         for k, task in waiting:
             yield k, function(k, task)
         return
@@ -85,9 +85,9 @@ def run_tasks(
     tasks: Iterable[tuple[int, Task]],
     run_here: Callable[[int, Task], Result],
 ) -> Iterator[tuple[int, Result]]:
-    """The results of numbered tasks as they come: by an executor if there is one, else in threads.
+    """Yield the numbers and results of tasks as they come: by an executor if there is one, else in threads.
 
-    Where time is over no further task is begun.
+    No task is started after the time limit.
     """
     if executor is None:
         return run_in_threads(threads, within_time(tasks), run_here)
@@ -100,16 +100,17 @@ def run_in_executor(
     tasks: Iterable[tuple[int, Task]],
     run_here: Callable[[int, Task], Result],
 ) -> Iterator[tuple[int, Result]]:
-    """The same by an executor: `function` of a task there, `run_here` of its number and itself where that is lost.
+    """The same by an executor that calls `function` of a task; if a task is lost, `run_here` is called with its number
+    and the task.
 
-    Whatever an executor raises, its tasks can be done here; a BadInput of the task itself is raised once.
+    Exceptions of the executor are not raised, as this process can run its tasks; a BadInput of a task is raised.
     """
     waiting, lost = iter(tasks), list[tuple[int, Task, int]]()
     running: dict[Future[Result], tuple[int, Task, int]] = {}
-    most = TASKS_PER_WORKER * worker_count(executor)
+    maximum = TASKS_PER_WORKER * worker_count(executor)
     try:
         while True:
-            while len(running) < most:
+            while len(running) < maximum:
                 following = lost.pop() if lost else next(((k, task, 0) for k, task in waiting), None)
                 if following is None:
                     break
@@ -136,7 +137,7 @@ def run_in_executor(
 
 
 def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:
-    """The results of the numbers 0, 1, 2 ..., which may come in any order."""
+    """Yield the results of numbered tasks, which come in any order, in the order 0, 1, 2 ..."""
     early: dict[int, Result] = {}
     following = 0
     for k, result in results:
@@ -147,8 +148,8 @@ def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:
 
 
 def _submit(executor: Executor, function: Callable[[Task], Result], task: Task) -> Future[Result] | None:
-    """A task in the executor's hands; None where it takes no more, as when its workers have been killed."""
+    """Submit a task; None if the executor takes no more, as when its workers have been killed."""
     try:
         return executor.submit(function, task)
-    except Exception:  # whatever an executor raises, the task can be done here
+    except Exception:  # this process can run the task, whatever an executor raises
         return None

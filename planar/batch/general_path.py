@@ -1,4 +1,4 @@
-"""The general path: one design of a sweep, solved as a cycle of its own."""
+"""The general path: one design of a sweep, solved as a separate cycle."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ GRID_TOLERANCE = 1e-9
 
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
-    every row, what there is to say of its end (which as text is the sentence), and of rates that are missing or of few
-    digits; where the input is at the dead point or at the stop that ends it (rad, m), not numbers where none does."""
+    every row, the reason of its end (its text is the sentence), a remark on rates that are missing or of few digits,
+    and the position of the input at the dead point or at the stop that ends it (rad, m; NaN without one)."""
 
     input: Array
     out: Array
@@ -40,7 +40,7 @@ class SolvedDesign(NamedTuple):
 
 
 class DesignQuestion(NamedTuple):
-    """A design by its numbers, and the arguments of `solve_design`; as text the sentence that says why it ends."""
+    """A design by its numbers, and the arguments of `solve_design`; its text says why the design ends."""
 
     mechanism: Mechanism
     values: Mapping[str, float]
@@ -66,9 +66,9 @@ def solve_design(
     points: tuple[PointName, ...],
     rates: bool,
 ) -> SolvedDesign:
-    """A design over a grid of positions (rows,) of its running input, or, without one, over a range of its own.
+    """Solve a design over a grid of positions (rows,) of its running input, or, without one, over its own range.
 
-    `range_` is the start and the stop that the cycle is asked for. Never raises NoAnswer: the status says it.
+    `range_` is the start and the stop of the cycle. Does not raise NoAnswer: the status contains it.
     """
 
     def run() -> tuple[Motion, Array]:
@@ -81,7 +81,7 @@ def solve_design(
 def solve_timed_design(
     mechanism: Mechanism, duration: float, steps: int, points: tuple[PointName, ...], rates: bool
 ) -> SolvedDesign:
-    """A design in time, all its inputs at once by their laws or rates: as `solve_design`, `input` the times (s)."""
+    """Solve a design in time, all its inputs by their laws or rates: as `solve_design`, `input` is the times (s)."""
 
     def run() -> tuple[Motion, Array]:
         motion = cycle(mechanism, steps, duration=duration)
@@ -93,7 +93,7 @@ def solve_timed_design(
 
 class GridMotion(NamedTuple):
     """The motion of one design (None where there is none), how many of its rows are on the grid, the status of every
-    row, and what there is to say of its end."""
+    row, and the reason of its end."""
 
     motion: Motion | None
     many: int
@@ -102,7 +102,7 @@ class GridMotion(NamedTuple):
 
 
 def run_design(mechanism: Mechanism, pair: str, grid: Array) -> GridMotion:
-    """The motion of a design over a grid of positions (rows,) of its running input. Never raises NoAnswer."""
+    """The motion of a design over a grid of positions (rows,) of its running input. Does not raise NoAnswer."""
 
     def run() -> tuple[Motion, Array]:
         motion = cycle(mechanism, len(grid) - 1, float(grid[0]), float(grid[-1]), pair)
@@ -114,7 +114,8 @@ def run_design(mechanism: Mechanism, pair: str, grid: Array) -> GridMotion:
 def _run_on_grid(
     run: Callable[[], tuple[Motion, Array]], grid: Array | None, steps: int
 ) -> tuple[GridMotion, Array | None]:
-    """A motion, and where its rows are; which of these are on a grid, or all where there is none."""
+    """Run a motion; return it with the number of rows that are on the grid (all without a grid), and the positions of
+    its rows."""
     status = np.zeros(steps + 1, dtype=np.int8)
     reason = time_is_over()
     if reason:
@@ -124,16 +125,17 @@ def _run_on_grid(
         motion, position = run()
     except NoAnswer as problem:
         status[:] = OUTCOMES.index(problem.outcome)
-        return GridMotion(None, 0, status, problem.with_traceback(None)), None  # its sentence takes long to find
+        return GridMotion(None, 0, status, problem.with_traceback(None)), None  # its sentence takes long to make
     except (BadInput, PointPlacementError) as problem:
         status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
         return GridMotion(None, 0, status, str(problem)), None
-    many = min(len(position), steps + 1)
+    row_count = min(len(position), steps + 1)
     if grid is not None:
-        off = np.abs(position[:many] - grid[:many]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
-        many = int(np.argmax(off)) if off.any() else many
-    status[many:] = OUTCOMES.index(motion.outcome)
-    return GridMotion(motion, many, status, motion.reason if many <= steps else ""), position
+        distance = np.abs(position[:row_count] - grid[:row_count])
+        is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
+        row_count = int(np.argmax(is_off)) if is_off.any() else row_count
+    status[row_count:] = OUTCOMES.index(motion.outcome)
+    return GridMotion(motion, row_count, status, motion.reason if row_count <= steps else ""), position
 
 
 def _solve(
@@ -143,39 +145,38 @@ def _solve(
     points: tuple[PointName, ...],
     rates: bool,
 ) -> SolvedDesign:
-    """The rows of a motion on a grid (rows,), or on its own; `run` gives the motion, and where its rows are."""
-    wide = 2 * len(points) * (3 if rates else 1)
-    out = np.full((steps + 1, wide), np.nan)
+    """The rows of a motion on a grid (rows,), or on its own; `run` returns the motion, and the positions of its
+    rows."""
+    out = np.full((steps + 1, 2 * len(points) * (3 if rates else 1)), np.nan)
     input_ = np.full(steps + 1, np.nan) if grid is None else grid
-    (motion, many, status, message), position = _run_on_grid(run, grid, steps)
+    (motion, row_count, status, message), position = _run_on_grid(run, grid, steps)
     if motion is None or position is None:
         return SolvedDesign(input_, out, status, message)
     if grid is None:
         input_[: len(position)] = position[: steps + 1]
-    out[:many] = point_rows(motion, points, rates)[:many]
-    told = "; ".join(motion.rate_remarks) if rates else ""
-    last = float(position[-1]) if many <= steps else np.nan
-    at_dead_point, at_stop = (motion.outcome is each for each in (Outcome.DEAD_POINT, Outcome.STOP))
-    ends = last if at_dead_point else np.nan, last if at_stop else np.nan
-    return SolvedDesign(input_, out, status, message, told, *ends)
+    out[:row_count] = point_rows(motion, points, rates)[:row_count]
+    remark = "; ".join(motion.rate_remarks) if rates else ""
+    last = float(position[-1]) if row_count <= steps else np.nan
+    ends = (last if motion.outcome is outcome else np.nan for outcome in (Outcome.DEAD_POINT, Outcome.STOP))
+    return SolvedDesign(input_, out, status, message, remark, *ends)
 
 
 def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:
-    """The angles of links (links, rows) over a motion, with all turns as they are followed."""
+    """The angles of links (links, rows) over a motion, counting turns."""
     return np.array([np.broadcast_to(value_and_rates(motion.frames[link].angle)[0], len(motion)) for link in links])
 
 
 def point_rows(motion: Motion, points: tuple[PointName, ...], rates: bool) -> Array:
     """x and y of points (rows, 2 a point and order) over a motion."""
-    found = [_point_motion(motion, name) for name in points]
+    motions = [_point_motion(motion, name) for name in points]
     orders = ("position", "velocity", "acceleration") if rates else ("position",)
-    if not found:
+    if not motions:
         return np.zeros((len(motion), 0))
-    return np.hstack([getattr(point, order) for order in orders for point in found])
+    return np.hstack([getattr(point, order) for order in orders for point in motions])
 
 
 def _point_motion(motion: Motion, name: PointName) -> PointMotion:
     if isinstance(name, str):
         return motion.point(name)
     orders = vector_and_rates(motion.frames[name.link].to_world(name.at))[:3]
-    return PointMotion(*(np.broadcast_to(stack_vectors(*each), (len(motion), 2)) for each in orders))
+    return PointMotion(*(np.broadcast_to(stack_vectors(*order), (len(motion), 2)) for order in orders))

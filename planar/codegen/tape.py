@@ -26,10 +26,10 @@ GOOD, DEAD_POINT, UNDECIDED = range(3)
 SHIFT = LANES.bit_length() - 1
 """By how many bits a number of steps is one of vectors."""
 LONG_CALL_NUMBERS = 2**14
-"""Blocks times steps from which on other threads go on while they are computed."""
+"""Blocks times steps from which on other threads run while they are computed."""
 MAX_BLOCK_FUNCTIONS = 4096
 GREATEST_CHANGE = 2.5
-"""Of a root up to its zero, in times of its change in the step before: 1 / (sqrt(2) - 1) at most."""
+"""Largest change of a square root up to its zero, divided by its change in the step before: 1 / (sqrt(2) - 1)."""
 BLOCK_NAME = "block"
 BLOCK_ARGUMENTS = (
     "i64 %limit, i64 %stride, ptr readonly %rows, ptr readonly %p, double %tolerance, double %clearance, ptr %ended"
@@ -108,12 +108,12 @@ done:
   ret void
 }}
 """
-"""Sequences from `begin` to `end`, each block by the function of its kind; a sequence that is not good at its first
-step goes no further. A dead point is none where a later block may come to another end before it."""
+"""Computes sequences from `begin` to `end`, each block by the function of its kind; a sequence that is not good at its
+first step ends there. A dead point is undecided where a later block may end before it."""
 
 
 class FormulaInput(NamedTuple):
-    """What a formula takes: ("row", slot, which of its rows), ("p", number), or ("z", unknown, 0 or 1)."""
+    """An input of a formula: ("row", slot, number of its row), ("p", number), or ("z", unknown, 0 or 1)."""
 
     source: str
     place: int
@@ -124,16 +124,16 @@ class BlockFormula:
     """A list of instructions with the numbers of its outputs and inputs."""
 
     def __init__(
-        self, listing: InstructionList[FormulaInput], wanted: tuple[int, ...], inputs: dict[int, FormulaInput]
+        self, instructions: InstructionList[FormulaInput], outputs: tuple[int, ...], inputs: dict[int, FormulaInput]
     ):
-        self.instructions, self.outputs, self.inputs = listing, wanted, inputs
-        self.order = required_values(listing, wanted)
+        self.instructions, self.outputs, self.inputs = instructions, outputs, inputs
+        self.order = required_values(instructions, outputs)
 
 
 class TapeFormula(NamedTuple):
-    """The formula of a kind of block: the slot and row to which each of its first values goes; by the numbers of the
-    values the vectors along links that may not turn fast, x, y and their squared length, None where that is one; and
-    whether the last two values are what is left open, and how clear of a dead point it is."""
+    """The formula of a kind of block: the slot and row of each of its first values; the vectors along links that must
+    not turn fast, by the numbers of the values x, y and squared length (None for a length of one); and whether the last
+    two values are the residual and the distance measure from a dead point."""
 
     formula: BlockFormula
     output_rows: tuple[tuple[int, int], ...]
@@ -144,8 +144,8 @@ class TapeFormula(NamedTuple):
 class Tape(NamedTuple):
     """Sequences of blocks: where each sequence begins in the blocks, first (sequences + 1,); of every block the number
     of its function in `kinds` (blocks,), the addresses of its slots (blocks, slots), whose rows are one after the
-    other, and its numbers p (blocks, numbers), each block after those that it needs; by how much constraints may be
-    open, tolerance (sequences,), and how clear of a dead point steps are at least, clearance (sequences,)."""
+    other, and its numbers p (blocks, numbers), each block after those that it needs; the `tolerance` of residuals
+    (sequences,), and the least distance measure from a dead point, `clearance` (sequences,)."""
 
     first: IntArray
     kinds: IntArray
@@ -199,11 +199,11 @@ class _BlockWriter:
     """Writes the function of `compile_block`."""
 
     def __init__(self, formula: TapeFormula, least_cosine: float):
-        self.ir, self.own, self.least_cosine = IRWriter(LANES), formula, least_cosine
+        self.ir, self.formula, self.least_cosine = IRWriter(LANES), formula, least_cosine
 
     def write(self) -> str:
         """The text of the function."""
-        t, tape_formula = self.ir, self.own
+        t, tape_formula = self.ir, self.formula
         t.write_line(f"define void @{BLOCK_NAME}({BLOCK_ARGUMENTS}) {{")
         t.write_label("entry")
         t.write_line(f"%rounded = add i64 %limit, {LANES - 1}")
@@ -218,13 +218,13 @@ class _BlockWriter:
             return t.double_pointer(slots[slot], t.add_instruction(f"mul i64 %stride, {row}"))
 
         names: dict[int, str] = {}
-        taken: dict[int, str] = {}
+        input_pointers: dict[int, str] = {}
         for number, leaf in tape_formula.formula.inputs.items():
             if leaf.source == "p":
                 place = t.double_pointer("%p", str(leaf.place))
                 names[number] = t.broadcast(t.add_instruction(f"load double, ptr {place}"))
             else:
-                taken[number] = row_pointer(leaf.place, leaf.part)
+                input_pointers[number] = row_pointer(leaf.place, leaf.part)
         output_pointers = [row_pointer(*place) for place in tape_formula.output_rows]
         t.write_line("br label %step")
         t.write_label("step")
@@ -232,10 +232,10 @@ class _BlockWriter:
         watched = [
             f"%watched{k}" for k in range(2 * len(tape_formula.directions) + 1 if tape_formula.is_checked else 0)
         ]
-        for each in watched:
-            t.write_line(f"{each} = phi {t.vector} [{t.constant(nan)}, %entry], [{each}next, %next]")
+        for name in watched:
+            t.write_line(f"{name} = phi {t.vector} [{t.constant(nan)}, %entry], [{name}next, %next]")
         t.write_line(f"%off = mul i64 %vector, {LANES}")
-        for number, pointer in taken.items():
+        for number, pointer in input_pointers.items():
             names[number] = t.load(t.double_pointer(pointer, "%off"))
         known: dict[int, str] = {}
         t.write_values(tape_formula.formula.instructions, tape_formula.formula.order, known, names)
@@ -262,12 +262,12 @@ class _BlockWriter:
         return t.module_text()
 
     def _write_check(self, watched: list[str], values: list[str]) -> None:
-        """Look at a vector of steps: directions, what is left open and how clear it is, as before in `watched`. At the
-        first that is not good the block ends."""
+        """Check a vector of steps: the turns of directions, the residual, and the distance measure from a dead point;
+        `watched` are the values of the vector before. The block ends at the first step that is not good."""
         t, byte = self.ir, f"i{LANES}"
         residual, clear = values[-2:]
         directions = [
-            LinkDirection(values[x], values[y], k if k is None else values[k]) for x, y, k in self.own.directions
+            LinkDirection(values[x], values[y], k if k is None else values[k]) for x, y, k in self.formula.directions
         ]
         parts = [*(part for direction in directions for part in direction[:2]), clear]
         earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=True)]
@@ -280,8 +280,8 @@ class _BlockWriter:
             t.write_line(f"{before}next = select i1 true, {t.vector} {value}, {t.vector} {value}")
         t.write_line(f"%fine = bitcast <{LANES} x i1> {t.and_flags(good, judged.is_clear)} to {byte}")
         t.write_line(f"%allfine = icmp eq {byte} %fine, -1")
-        t.write_line("br i1 %allfine, label %next, label %found")
-        t.write_label("found")
+        t.write_line("br i1 %allfine, label %next, label %ending")
+        t.write_label("ending")
         bad = t.add_instruction(f"xor {byte} %fine, -1")
         lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
         t.write_line(f"%come = add i64 %off, {t.add_instruction(f'zext {byte} {lane} to i64')}")
@@ -312,20 +312,20 @@ class LinkDirection(NamedTuple):
 def write_turn_flags(
     t: IRWriter, is_good: str, directions: Sequence[LinkDirection], earlier: Sequence[str], least_cosine: float
 ) -> str:
-    """Where it is good, and none of the directions, which were so in the step before (x and y of each), turns fast."""
+    """Whether a step is good and no direction turns fast; `earlier` are x and y of each in the step before."""
     for k, (x, y, square) in enumerate(directions):
         along = t.add_all([t.binary("mul", a, b) for a, b in zip((x, y), earlier[2 * k : 2 * k + 2], strict=True)])
         minimum = t.constant(least_cosine)
         if square is not None:
             minimum = t.binary("mul", square, minimum)
-        # at the first step there is none before
+        # NaN before the first step passes
         is_good = t.and_flags(is_good, t.compare("uge", along, minimum))
     return is_good
 
 
 class ClearFlags(NamedTuple):
-    """Whether no dead point is near a step; how clear the two steps before it are at least, and how clear they need to
-    be."""
+    """Whether no dead point is near a step; the least distance measure of the two steps before it, and the least that
+    they need."""
 
     is_clear: str
     least_before: str
@@ -333,73 +333,33 @@ class ClearFlags(NamedTuple):
 
 
 def write_clear_flags(t: IRWriter, clear: str, one: str, two: str, clearance: str) -> ClearFlags:
-    """Judge by how clear of a dead point a step and the two before it are: between steps that bends by less than its
-    second differences say."""
+    """Judge a step by its distance measure from a dead point and those of the two steps before: between steps it
+    deviates by less than its second difference."""
 
-    def pick(how: str, a: str, b: str) -> str:
-        return t.select(t.compare(how, a, b), a, b)
+    def pick(predicate: str, a: str, b: str) -> str:
+        return t.select(t.compare(predicate, a, b), a, b)
 
     bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
-    # at the first steps some of these are no numbers, which is passed over
+    # NaN before the first steps passes
     needed, minimum = pick("ogt", bend, clearance), pick("olt", two, one)
     return ClearFlags(t.compare("ogt", pick("olt", minimum, clear), needed), minimum, needed)
 
 
 def write_stays_clear(t: IRWriter, clear: str, one: str, clearance: str) -> str:
-    """Whether no dead point is near before the next step, by how clear a step and the one before it are: towards where
-    another block has one this changes as the root of the way that is left."""
+    """Whether no dead point is near before the next step, by the distance measures of a step and the one before:
+    towards a dead point of another block the measure changes as the root of the distance to it."""
     change = t.call_intrinsic("fabs", t.binary("sub", clear, one))
     ahead = t.binary("sub", clear, t.binary("mul", t.constant(GREATEST_CHANGE), change))
     return t.compare("ogt", ahead, clearance)
 
 
 def write_stays(t: IRWriter, flag: str) -> None:
-    """Tell whether a block stays clear."""
+    """Store whether a block stays clear."""
     place = t.add_instruction("getelementptr i64, ptr %ended, i64 2")
     t.write_line(f"store i64 {t.add_instruction(f'zext i1 {flag} to i64')}, ptr {place}")
 
 
 def write_ended(t: IRWriter, step: str, outcome: str) -> None:
-    """Tell the first step that is not good, and the outcome there."""
+    """Store the first step that is not good, and the outcome there."""
     t.write_line(f"store i64 {step}, ptr %ended")
     t.write_line(f"store i64 {outcome}, ptr {t.add_instruction('getelementptr i64, ptr %ended, i64 1')}")
-
-
-def clear_rows(addresses: IntArray, first: IntArray, count: int) -> None:
-    """Set rows at addresses (rows,) to NaN from the index first (rows,) on; `count`, a multiple of LANES, is their
-    length."""
-    if len(addresses):
-        held = [np.ascontiguousarray(each, dtype=np.int64) for each in (addresses, first)]
-        _compiled_clearing()(len(addresses), count, *(each.ctypes.data for each in held))
-
-
-@lru_cache(maxsize=1)
-def _compiled_clearing() -> Any:
-    """clear(many, count, rows, first)."""
-    t = IRWriter(LANES)
-    t.write_line("define void @clear(i64 %many, i64 %count, ptr readonly %rows, ptr readonly %first) {")
-    t.write_label("entry")
-    t.write_line(f"%vectors = lshr i64 %count, {LANES.bit_length() - 1}")
-    t.write_line("br label %row")
-    t.write_label("row")
-    t.write_line("%i = phi i64 [0, %entry], [%inext, %rowend]")
-    t.write_line(f"%at = load ptr, ptr {t.add_instruction('getelementptr ptr, ptr %rows, i64 %i')}")
-    t.write_line(f"%from = load i64, ptr {t.add_instruction('getelementptr i64, ptr %first, i64 %i')}")
-    t.write_line(f"%begin = lshr i64 %from, {LANES.bit_length() - 1}")
-    last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 %from, i64 0")
-    t.write_line("%some = icmp slt i64 %begin, %vectors")
-    t.write_line("br i1 %some, label %vector, label %rowend")
-    t.write_label("vector")
-    t.write_line("%v = phi i64 [%begin, %row], [%vnext, %vector]")
-    place = t.add_instruction(f"mul i64 %v, {LANES}")
-    pointer = t.double_pointer("%at", place)
-    flag, nan = t.lanes_from(place, last), t.constant(float("nan"))
-    own = t.load(pointer)
-    t.store(t.add_instruction(f"select <{LANES} x i1> {flag}, {t.vector} {nan}, {t.vector} {own}"), pointer)
-    t.close_loop("v", "vectors", "vector", "rowend")
-    t.write_label("rowend")
-    t.close_loop("i", "many", "row", "done")
-    t.write_label("done")
-    t.write_line("ret void")
-    t.write_line("}")
-    return compile_function(t.module_text(), "clear", "int", "int", "array", "array")

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.whole_turns import run_whole_turns
+from planar.batch.mechanisms.linkages import SweepRequest
+from planar.batch.mechanisms.part_runs import solve_part
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
@@ -68,18 +69,14 @@ def random_linkages(links: int, count: int, steps: int, seed: Sequence[int]) -> 
         if turn >= PATIENCE:
             drawn[left] = random.integers(len(known), size=len(left))
         start, link, linkages = _draw([known[k].linkage for k in drawn[left]], random)
-        is_whole, part = run_whole_turns(linkages, steps)
-        first = part.first
+        # what compiled code leaves open comes to a dead point in most cases
+        part = solve_part(linkages, SweepRequest(steps, None, False, None), uses_general_path=False)
+        is_whole, first = part.last_status == 0, part.points.first
         for k in np.flatnonzero(is_whole).tolist():
-            row, pins = left[k], part.pins[first[k] : first[k + 1]]
+            row, pins = left[k], part.points.codes[first[k] : first[k + 1]]
             found.start[row], found.coupler_link[row] = start[k], link[k]
             found.path[row] = start[k]
-            own = part.found_elsewhere.get(k)
-            if own is None:
-                found.path[row][:, pins] = part.values[first[k] : first[k + 1], :, : steps + 1].transpose(2, 0, 1)
-            else:
-                for pin in pins.tolist():
-                    found.path[row][:, pin] = own.position[f"P{pin}"]
+            found.path[row][:, pins] = part.values[first[k] : first[k + 1], :, : steps + 1].transpose(2, 0, 1)
         left = left[~is_whole]
         if not len(left):
             return found

@@ -61,7 +61,6 @@ def test_mechanisms_of_any_structure_by_any_number_of_workers(monkeypatch):
     from planar.batch import sweep_mechanisms
 
     monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 2)
-    monkeypatch.setattr(sweep_mechanisms, "LINKAGES_PART_SIZE", 5)
     mixed = [four_bar(*ROCKER, 0.8), MODELS["004-QR"], *pinned(3), MODELS["double-butterfly"], MODELS["slider-crank"]]
     for mechanisms in (mixed, pinned()):
         alone, found = (planar.sweep_each(mechanisms, STEPS, workers=workers) for workers in (1, 3))

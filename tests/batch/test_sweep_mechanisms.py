@@ -130,7 +130,7 @@ def test_blocks_without_closed_form_start_at_inexact_sketches(seed, links, blur)
     """The assembly is the one that the mechanism itself takes, though its sketch is off, or shows one point alone of a
     link that slides on another (the last)."""
     mechanism = files.from_dict(random_linkage(seed, links, blur=blur).value)
-    assert not all(each.block_type.has_closed_form for each in partition_mechanism(mechanism).blocks)
+    assert not all(each.block_type.has_closed_form for each in partition_mechanism(mechanism)[0].blocks)
     result = planar.sweep_each([mechanism], 20, pair=mechanism.inputs[0].pair)
     assert result.sent == 0
     as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
@@ -196,7 +196,7 @@ def test_linkages_as_arrays_in_parts_and_with_points_of_some(monkeypatch):
     given, rates = as_arrays([dyads(seed, 4 + seed % 4) for seed in range(7)])
     linkages = planar.pinned_linkages(*given, **rates)
     whole = planar.sweep_each(linkages, 100, ["P5", "P0"])
-    monkeypatch.setattr(sweep_mechanisms, "LINKAGES_PART_SIZE", 3)
+    monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 3)
     with ThreadPoolExecutor(2) as pool:
         found = [planar.sweep_each(linkages, 100, ["P5", "P0"], executor=each) for each in (None, pool)]
     for result in found:
@@ -327,7 +327,7 @@ def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypat
     mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
     longest = 500
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", longest)
-    monkeypatch.setattr(partition, "_BLOCK_TYPES", {})
+    monkeypatch.setattr(partition, "_structures", {})
     find_block_type.cache_clear()
     result = planar.sweep_each(mechanisms, 12)
     find_block_type.cache_clear()
@@ -409,7 +409,7 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
         (triads(3), [1, 4, 4, 4]),
         (MODELS["double-butterfly"], [1, 6]),
     ):
-        own = partition_mechanism(mechanism)
+        own = partition_mechanism(mechanism)[0]
         assert [len(group.inner_links) for group in own.blocks] == sizes
         assert sorted(own.link_index.values())[0] == 0
         known = {0, 1}
@@ -418,11 +418,26 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
             assert set(group.link_indices) <= known | inner
             assert not known & inner
             known |= inner
-    assert (
-        len({id(group.block_type) for group in partition_mechanism(planar.from_dict(chain.document(42))).blocks}) <= 4
-    )
+    blocks = partition_mechanism(planar.from_dict(chain.document(42)))[0].blocks
+    assert len({id(group.block_type) for group in blocks}) <= 4
     with pytest.raises(NotPartitionable, match=r"held more than once|free"):
         partition_mechanism(MODELS["three-parallel-cranks"])
+
+
+def test_mechanisms_of_one_structure_share_it_and_differ_in_their_numbers(monkeypatch):
+    mechanisms = [four_bar(*ROCKER, 0.8), four_bar(*(1.1 * length for length in ROCKER), 0.7)]
+    (structure, numbers), (other_structure, other_numbers) = map(partition_mechanism, mechanisms)
+    assert structure is other_structure
+    assert numbers != other_numbers
+    undriven = replace(mechanisms[0], inputs=(), sketch=())
+    with pytest.raises(NotPartitionable, match="free"):
+        partition_mechanism(undriven)
+    together = planar.sweep_each(mechanisms, 24)
+    for mechanism, found in zip(mechanisms, together, strict=True):
+        monkeypatch.setattr(partition, "_structures", {})
+        (alone,) = planar.sweep_each([mechanism], 24)
+        for name, values in found.acceleration.items():
+            np.testing.assert_array_equal(values, alone.acceleration[name])
 
 
 DYADS = ("TTT", "TTS", "TST", "STS", "SST", "TSS")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from itertools import product
 from typing import NamedTuple
 
@@ -37,7 +37,8 @@ SKETCH_SUMS = 8
 
 
 class BlockPair(NamedTuple):
-    """A pair of a kind: its type, its bodies (inner links from 0 on, given ones -1, -2, ...), whether it is driven."""
+    """A pair of a block type: its pair type, its bodies (inner links 0, 1, ..., given ones -1, -2, ...), and whether it
+    is driven."""
 
     type: type[Pair]
     bodies: tuple[int, ...]
@@ -45,7 +46,7 @@ class BlockPair(NamedTuple):
 
 
 class BlockSignature(NamedTuple):
-    """What makes a kind: how many links are inner and given, and the pairs in their order."""
+    """What defines a block type: the counts of inner and given links, and the pairs in their order."""
 
     inner_count: int
     given_count: int
@@ -53,10 +54,11 @@ class BlockSignature(NamedTuple):
 
 
 class _SymbolicPair:
-    """A pair between the links of a kind: the formulas of its type with bodies of its own."""
+    """A pair between the links of a block type: the formulas of its pair type with other bodies."""
 
-    def __init__(self, name: str, joint: BlockPair, like: Pair):
-        self.name, self.bodies, self.sample = name, tuple(_body_name(body) for body in joint.bodies), like
+    def __init__(self, name: str, joint: BlockPair):
+        like = _sample_pair(joint.type)
+        self.name, self.bodies = name, tuple(_body_name(body) for body in joint.bodies)
         self.residual_kinds, self.number_kinds = like.residual_kinds, like.number_kinds
         self.coordinate_kinds, self.input_kind = like.coordinate_kinds, like.input_kind
         self.residual, self.input_position = like.residual, like.input_position
@@ -73,19 +75,23 @@ def _body_name(body: int) -> str:
     return "frame" if body == FRAME_BODY else f"inner{body}" if body >= 0 else f"given{-1 - body}"
 
 
-class BlockEquations:
-    """One kind of groups: its equations, with those of their groups that are in closed form.
+MAX_SIGNS = 2
+"""Maximum number of signs of a block type in closed form."""
+MAX_BLOCK_TYPES = 1024
+"""Number of block types that are kept."""
 
-    What it takes, in slots: the given links, the inputs, then the inner links. In numbers: p of the pairs, the cosine
-    and sine of those that are angles, then a sign for each group that can be assembled in two ways; where it starts,
-    in their place the sums of the points in the sketch, see `_sketch_sums` of the initial assembly.
+
+class BlockType:
+    """One type of block: its equations, in closed form where there is one, and the formulas that solve it.
+
+    Slots are the given links, the inputs, then the inner links. Numbers are p of the pairs, the cosine and sine of
+    those that are angles, then a sign for each group of equations that has two assembly modes; at the start, in place
+    of the signs, the sums of the points in the sketch, see `_sketch_sums` of the initial assembly.
     """
 
-    def __init__(self, signature: BlockSignature, samples: Sequence[Pair]):
+    def __init__(self, signature: BlockSignature):
         self.signature = signature
-        pairs = tuple(
-            _SymbolicPair(f"p{k}", *each) for k, each in enumerate(zip(signature.pairs, samples, strict=True))
-        )
+        pairs = tuple(_SymbolicPair(f"p{k}", pair) for k, pair in enumerate(signature.pairs))
         self.given_links = tuple(_body_name(-1 - k) for k in range(signature.given_count))
         inner = tuple(_body_name(k) for k in range(signature.inner_count))
         self.inner_links = inner
@@ -102,16 +108,76 @@ class BlockEquations:
         self.length_measures = tuple(k for k, measure in enumerate(self.measures) if measure is Measure.LENGTH)
         self.blocks = tuple(stage for stage in e.blocks if slice_length(stage.rows) or slice_length(stage.unknowns))
         self.closed_forms = [find_closed_form(e, stage) or linear_form(e, stage) for stage in self.blocks]
-        self.sign_count = sum(each is not None and isinstance(each, ClosedForm) for each in self.closed_forms)
-        "how many groups in it can be assembled in two ways"
-        self.is_square = e.is_square and not any(pair.sample.counts_turns for pair in pairs)
-        "whether it can be solved without the whole"
+        self.sign_count = sum(isinstance(form, ClosedForm) for form in self.closed_forms)
+        "how many groups of its equations have two assembly modes"
+        self.is_square = e.is_square
+
+        self.has_closed_form = (
+            self.is_square and self.sign_count <= MAX_SIGNS and all(form is not None for form in self.closed_forms)
+        )
+        "whether all unknowns are in closed form, by formulas that can be compiled"
+        self.has_newton_formulas = False
+        "whether Newton's method can follow it, where it is not in closed form"
+        self._run_formulas: dict[tuple[bool, bool], BlockFormula] = {}
+        if self.has_closed_form:
+            try:
+                self.start_formula, self.run_formula(False)
+            except UnsupportedOperation:
+                self.has_closed_form = False
+        if self.is_square and not self.has_closed_form:
+            with suppress(UnsupportedOperation):
+                self.has_newton_formulas = self.newton_formulas is not None
 
     @property
     def unknown_is_angle(self) -> tuple[bool, ...]:
         """Of every unknown whether it is an angle."""
         e = self.equations
         return tuple(e.coordinates[column].kind is not Measure.LENGTH for column in e.unknowns)
+
+    @property
+    def number_count(self) -> int:
+        """How many numbers of its pairs it takes, with the cosine and sine of angles."""
+        return len(self.measures) + 2 * len(self.angle_measures)
+
+    @cached_property
+    def start_formula(self) -> BlockFormula:
+        """(given links and inputs, numbers with sums of the sketch) -> of the assembly mode nearest to the sketch x, y,
+        cos and sin of the inner links, then its signs, its squared distance, that of the next mode, its residual, and
+        the least distance measure of any mode from a dead point."""
+        work = FormulaBuilder(self)
+        sums = [
+            [work.add_input("p", self.number_count + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)]
+            for k in range(len(self.inner_links))
+        ]
+        modes = []
+        for signs in product((1.0, -1.0), repeat=self.sign_count):
+            sign_numbers = [work.instructions.add_constant(sign) for sign in signs]
+            assembly = work.closed_form_assembly(sign_numbers)
+            poses = work.poses(assembly)
+            residual, clear = work.acceptance_values(assembly, work.residuals(assembly, poses))
+            outputs = [*(number for pose in poses for number in pose), *sign_numbers, residual]
+            modes.append(_StartMode(outputs, work.sketch_distance(poses, sums), residual, clear))
+        *outputs, residual, nearest, second, least_clear = work.nearest_mode(modes)
+        return work.make_formula([*outputs, nearest, second, residual, least_clear])
+
+    @cached_property
+    def newton_formulas(self) -> NewtonFormulas:
+        """The formulas by which Newton's method follows a type that is not in closed form. Raises
+        UnsupportedOperation."""
+        return NewtonFormulas(*(FormulaBuilder(self).newton_formula(rates) for rates in (None, False, True)))
+
+    def run_formula(self, rates: bool, polished: bool = False) -> BlockFormula:
+        """(given links and inputs, numbers) -> rows of the inner links, then the residual and the distance measure from
+        a dead point."""
+        if (rates, polished) not in self._run_formulas:
+            work = FormulaBuilder(self)
+            signs = [work.add_input("p", self.number_count + k) for k in range(self.sign_count)]
+            assembly = work.closed_form_assembly(signs, polished)
+            poses = work.poses(assembly)
+            acceptance = work.acceptance_values(assembly, work.residuals(assembly, poses))
+            outputs = [*work.link_rows(assembly, poses, rates), *acceptance]
+            self._run_formulas[rates, polished] = work.make_formula(outputs)
+        return self._run_formulas[rates, polished]
 
 
 class LinearForm(NamedTuple):
@@ -123,57 +189,57 @@ class LinearForm(NamedTuple):
 
 def linear_form(e: ConstraintEquations, stage: Block) -> LinearForm | None:
     """The only assembly of a group of one or two lengths whose constraints are linear in them; None for others."""
-    many = slice_length(stage.unknowns)
+    count = slice_length(stage.unknowns)
     lengths = all(e.coordinates[column].kind is Measure.LENGTH for column in e.unknowns[stage.unknowns])
-    if stage.is_free or many != slice_length(stage.rows) or many > 2 or not lengths:
+    if stage.is_free or count != slice_length(stage.rows) or count > 2 or not lengths:
         return None
-    rows, own = e.F[stage.rows], e.z[stage.unknowns]
-    slope = ca.densify(ca.jacobian(rows, own))
+    rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
+    jacobian = ca.densify(ca.jacobian(rows, unknowns))
     if any(e.rows[row].kind is Measure.ANGLE for row in range(stage.rows.start, stage.rows.stop)):
         return None
-    if ca.jacobian_sparsity(slope, own).nnz():
+    if ca.jacobian_sparsity(jacobian, unknowns).nnz():
         return None
-    found = -solve_by_determinants(slope, ca.substitute(rows, own, ca.SX.zeros(many)))
-    if many == 1:
-        return LinearForm(((found,),), ca.SX(0.0))
-    det = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
-    bend = 1.0 - det * det / (ca.sumsqr(slope[:, 0]) * ca.sumsqr(slope[:, 1]))
-    return LinearForm(tuple((found[k],) for k in range(many)), bend)
+    values = -solve_by_determinants(jacobian, ca.substitute(rows, unknowns, ca.SX.zeros(count)))
+    if count == 1:
+        return LinearForm(((values,),), ca.SX(0.0))
+    det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
+    coalescence = 1.0 - det * det / (ca.sumsqr(jacobian[:, 0]) * ca.sumsqr(jacobian[:, 1]))
+    return LinearForm(tuple((values[k],) for k in range(count)), coalescence)
 
 
 NAN_PROBE = 1e-300
-"""Times what is a number it is nothing beside round-off; times what is none it is none."""
+"""A number times it is negligible beside round-off; NaN and infinity times it are not."""
 
 
 FAR_AWAY = 1e300
-"""A squared distance, and more than what is left open where there is a way."""
+"""A squared distance, greater than any residual of an assembly."""
 
 
 class SymbolicAssembly(NamedTuple):
-    """A way to assemble a kind: the numbers of the values that stand for its unknowns, and of its bends."""
+    """An assembly of a block type: the numbers of the values that stand for its unknowns, and of its coalescences."""
 
     z: list[int]
     cos_sin: dict[int, CosSin]
-    bends: list[int]
+    coalescences: list[int]
 
 
-class _StartWay(NamedTuple):
+class _StartMode(NamedTuple):
     """Values of one assembly mode by their numbers: its outputs, its squared distance to the sketch, its residual, and
     its distance measure from a dead point."""
 
     outputs: list[int]
     distance: int
-    left: int
+    residual: int
     clear: int
 
 
 class FormulaBuilder:
-    """The formulas of a kind, put into one listing."""
+    """Writes the formulas of a block type into one list of instructions."""
 
-    def __init__(self, block_equations: BlockEquations):
-        self.block_equations, self.equations = block_equations, block_equations.equations
+    def __init__(self, block_type: BlockType):
+        self.block_type, self.equations = block_type, block_type.equations
         self.instructions: InstructionList[FormulaInput] = InstructionList()
-        e, given, measures = self.equations, len(block_equations.given_links), block_equations.measures
+        e, given, measures = self.equations, len(block_type.given_links), block_type.measures
         self.symbols = [e.u, e.p, ca.SX.sym("u1", e.u.numel()), ca.SX.sym("u2", e.u.numel())]
         self.u: list[int] = []
         self.cos_sin: dict[int, CosSin] = {}
@@ -183,7 +249,7 @@ class FormulaBuilder:
             if part == 2 or e.input_kinds[k] is not Measure.LENGTH:
                 self.cos_sin[self.u[-1]] = CosSin(self.add_input("row", slot, COS), self.add_input("row", slot, SIN))
         self.p = [self.add_input("p", k) for k in range(len(measures))]
-        for place, k in enumerate(block_equations.angle_measures):
+        for place, k in enumerate(block_type.angle_measures):
             both = (self.add_input("p", len(measures) + 2 * place + part) for part in (0, 1))
             self.cos_sin[self.p[k]] = CosSin(*both)
         rows = [(k // 3, X1 + k % 3, X2 + k % 3) if k < 3 * given else (given + k - 3 * given, X1, X2)
@@ -192,86 +258,90 @@ class FormulaBuilder:
         self.u2 = [self.add_input("row", slot, second) for slot, _, second in rows]
 
     def add_input(self, source: str, place: int, part: int = 0) -> int:
-        """A value from outside; those of "angle" and "unknown" are stood for by their cos and sin."""
+        """Add an input; "angle" and "unknown" are represented by their cos and sin."""
         return self.instructions.add_input(FormulaInput(source, place, part))
 
     def add_unknown(self) -> int:
-        """A value that no other is, stood for by its cos and sin, or by what it is put together from."""
+        """Add a new value, represented by its cos and sin, or by its parts."""
         return self.add_input("unknown", len(self.instructions.instructions))
 
     def _inline(
         self, of: Sequence[ca.SX], outputs: list[ca.SX], z: list[int], more: Sequence[list[int]] = ()
     ) -> list[int]:
         """The values of expressions in z, u, p, u1, u2 and further symbols."""
-        whole = ca.densify(ca.vertcat(*outputs))
-        function = ca.Function("part", [self.equations.z, *self.symbols, *of], [whole], {"cse": True})
+        column = ca.densify(ca.vertcat(*outputs))
+        function = ca.Function("part", [self.equations.z, *self.symbols, *of], [column], {"cse": True})
         arguments = [z, self.u, self.p, self.u1, self.u2, *more]
         return inline_function(self.instructions, function, arguments)[0]
 
     def closed_form_assembly(self, signs: Sequence[int], polished: bool = False) -> SymbolicAssembly:
         """The unknowns, group after group, by their closed forms; polished by a step of Newton's method."""
-        e, way = self.equations, len(self.instructions.instructions)
-        z = [self.add_input("unknown", way, k) for k in range(e.z.numel())]
-        turned, bends, left = {}, [], iter(signs)
-        for stage, form in zip(self.block_equations.blocks, self.block_equations.closed_forms, strict=True):
+        e, first = self.equations, len(self.instructions.instructions)
+        z = [self.add_input("unknown", first, k) for k in range(e.z.numel())]
+        cos_sin, coalescences, rest = {}, [], iter(signs)
+        for stage, form in zip(self.block_type.blocks, self.block_type.closed_forms, strict=True):
             assert form is not None
-            flat = [*(part for found in form.values for part in found), form.coalescence]
+            flat = [*(part for value in form.values for part in value), form.coalescence]
             if isinstance(form, ClosedForm):
-                values = iter(self._inline([form.sign], flat, z, [[next(left)]]))
+                values = iter(self._inline([form.sign], flat, z, [[next(rest)]]))
             else:
                 values = iter(self._inline((), flat, z))
-            own = range(stage.unknowns.start, stage.unknowns.stop)
-            parts = {k: [next(values) for _ in found] for k, found in zip(own, form.values, strict=True)}
-            bends.append(next(values))
+            columns = range(stage.unknowns.start, stage.unknowns.stop)
+            parts = {k: [next(values) for _ in value] for k, value in zip(columns, form.values, strict=True)}
+            coalescences.append(next(values))
             if polished:
                 parts = self._polish(stage, z, parts)
-            for k, found in parts.items():
-                if len(found) == 2:
-                    self.cos_sin[z[k]] = turned[k] = CosSin(*found)
+            for k, value in parts.items():
+                if len(value) == 2:
+                    self.cos_sin[z[k]] = cos_sin[k] = CosSin(*value)
                 else:
-                    z[k] = found[0]
-        return SymbolicAssembly(z, turned, bends)
+                    z[k] = value[0]
+        return SymbolicAssembly(z, cos_sin, coalescences)
 
     def newton_formula(self, rates: bool | None) -> BlockFormula:
-        """One of the formulas of `NewtonFormulas`: None for the step, else what is told."""
-        e, kind = self.equations, self.block_equations
-        z, turned = [], {}
+        """One of the formulas of `NewtonFormulas`: None for the step, else the rows of links without or with rates."""
+        e, kind = self.equations, self.block_type
+        z, cos_sin = [], {}
         for k, is_angle in enumerate(kind.unknown_is_angle):
             z.append(self.add_unknown() if is_angle else self.add_input("z", k, 0))
             if is_angle:
-                turned[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", k, 0), self.add_input("z", k, 1))
+                cos_sin[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", k, 0), self.add_input("z", k, 1))
         if rates is None:
             step, square, *lengths = solve_with_volume(ca.densify(ca.jacobian(e.F, e.z)), e.F)
             strength = square / lengths[0] if lengths else square
             return self.make_formula(self._inline((), [step, strength], z))
-        way = SymbolicAssembly(z, turned, [])
-        poses = rows = self.poses(way)
+        assembly = SymbolicAssembly(z, cos_sin, [])
+        poses = self.poses(assembly)
+        residual, _ = self.acceptance_values(assembly, self.residuals(assembly, poses))
+        return self.make_formula([*self.link_rows(assembly, poses, rates), residual])
+
+    def link_rows(self, assembly: SymbolicAssembly, poses: list[list[int]], rates: bool) -> list[int]:
+        """The rows of the inner links: their poses, each followed by its rates if they are wanted."""
         if rates:
-            rows = [[*pose, *more] for pose, more in zip(poses, self.rates(way), strict=True)]
-        left, _ = self.acceptance_values(way, self.residuals(way, poses))
-        return self.make_formula([*(each for pose in rows for each in pose), left])
+            poses = [pose + rows for pose, rows in zip(poses, self.rates(assembly), strict=True)]
+        return [number for pose in poses for number in pose]
 
     def _polish(self, stage: Block, z: list[int], parts: dict[int, list[int]]) -> dict[int, list[int]]:
-        """The unknowns of a group after a step of Newton's method, angles turned by the rational rotation."""
+        """The unknowns of a group after a step of Newton's method, angles rotated by the rational rotation."""
         e, add, one = self.equations, self.instructions.add, self.instructions.add_constant(1.0)
         near = list(z)
-        for k, found in parts.items():
-            if len(found) == 2:
-                c, s = found
+        for k, value in parts.items():
+            if len(value) == 2:
+                c, s = value
                 size = add("sqrt", add("add", add("mul", c, c), add("mul", s, s)))
                 parts[k] = [add("div", c, size), add("div", s, size)]
                 near[k] = self.add_unknown()
                 self.cos_sin[near[k]] = CosSin(*parts[k])
             else:
-                near[k] = found[0]
+                near[k] = value[0]
         slope = block_jacobian(e, stage.rows, stage.unknowns)
         step = self._inline((), [solve_by_determinants(slope, e.F[stage.rows])], near)
         polished = {}
-        for (k, own), back in zip(parts.items(), step, strict=True):
-            if len(own) == 1:
-                polished[k] = [add("sub", own[0], back)]
+        for (k, value), back in zip(parts.items(), step, strict=True):
+            if len(value) == 1:
+                polished[k] = [add("sub", value[0], back)]
                 continue
-            c, s = own
+            c, s = value
             half = add("mul", self.instructions.add_constant(-0.5), back)
             square = add("mul", half, half)
             scale = add("div", one, add("add", one, square))
@@ -283,26 +353,26 @@ class FormulaBuilder:
         return polished
 
     def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple[ca.SX, ...]]]:
-        """Frames of the inner links and own coordinates of the pairs, in the unknowns."""
-        e, kind = self.equations, self.block_equations
+        """Frames of the inner links and coordinates of the pairs, in the unknowns."""
+        e, kind = self.equations, self.block_type
         column = coordinate_columns(e.coordinates)
         return frames_from_coordinates(
             ca.vertsplit(e.w), column, kind.inner_links, {pair.name: pair for pair in kind.mechanism.pairs}
         )
 
-    def poses(self, way: SymbolicAssembly) -> list[list[int]]:
+    def poses(self, assembly: SymbolicAssembly) -> list[list[int]]:
         """x, y, cos and sin of every inner link."""
         frames, _ = self._inner_frames()
-        parts = [part for name in self.block_equations.inner_links for part in frames[name][:4]]
-        values = self._inline((), [ca.SX(part) for part in parts], way.z)
-        return [values[4 * k : 4 * k + 4] for k in range(len(self.block_equations.inner_links))]
+        parts = [part for name in self.block_type.inner_links for part in frames[name][:4]]
+        values = self._inline((), [ca.SX(part) for part in parts], assembly.z)
+        return [values[4 * k : 4 * k + 4] for k in range(len(self.block_type.inner_links))]
 
-    def residuals(self, way: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
-        """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
+    def residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
+        """The residual of every constraint by the formulas of the pairs, independent of the elimination.
 
         Of an angle that closes modulo a turn |sin| + 1 - cos; of cos and sin of an unknown, how far from the circle.
         """
-        e, kind = self.equations, self.block_equations
+        e, kind = self.equations, self.block_type
         places = ca.SX.sym("places", 3 * len(kind.inner_links))
         poses_given: list[int] = []
         for x, y, c, s in poses:
@@ -311,83 +381,83 @@ class FormulaBuilder:
         names = (*kind.given_links, *kind.inner_links)
         split = [*ca.vertsplit(e.u)[: 3 * len(kind.given_links)], *ca.vertsplit(places)]
         frames = {name: frame_at(*split[3 * k : 3 * k + 3]) for k, name in enumerate(names)} | {"frame": GROUND}
-        _, own = self._inner_frames()
+        _, coordinates = self._inner_frames()
         pairs = kind.mechanism.pairs
         numbers = split_pair_numbers(pairs, e.p)
         driven = [pair for pair, joint in zip(pairs, kind.signature.pairs, strict=True) if joint.driven]
         rows = [
-            *pair_residuals(pairs, frames, numbers, own),
-            *input_residuals(driven, frames, numbers, own, scalars(e.u)[3 * len(kind.given_links) :]),
+            *pair_residuals(pairs, frames, numbers, coordinates),
+            *input_residuals(driven, frames, numbers, coordinates, scalars(e.u)[3 * len(kind.given_links) :]),
         ]
-        open_ = [closing_error(value, row.kind) for row, value in rows]
-        values = self._inline((places,), [ca.SX(each) for each in open_], way.z, (poses_given,))
+        errors = [closing_error(value, row.kind) for row, value in rows]
+        values = self._inline((places,), [ca.SX(error) for error in errors], assembly.z, (poses_given,))
         add = self.instructions.add
-        for c, s in way.cos_sin.values():
+        for c, s in assembly.cos_sin.values():
             square = add("add", add("mul", c, c), add("mul", s, s))
             values.append(add("sub", square, self.instructions.add_constant(1.0)))
         return values
 
-    def acceptance_values(self, way: SymbolicAssembly, residuals: list[int]) -> list[int]:
-        """What is left open at most, and the least of how far from where two ways meet."""
+    def acceptance_values(self, assembly: SymbolicAssembly, residuals: list[int]) -> list[int]:
+        """The largest residual, and the least distance measure from a dead point."""
         add = self.instructions.add
-        left = whole = self.instructions.add_constant(0.0)
-        for gap in residuals:
-            own = add("abs", gap)
-            left, whole = add("maxnum", left, own), add("add", whole, own)
-        # what is no number stays so in a sum, but not in the greatest
-        left = add("add", left, add("mul", self.instructions.add_constant(NAN_PROBE), whole))
+        largest = total = self.instructions.add_constant(0.0)
+        for residual in residuals:
+            size = add("abs", residual)
+            largest, total = add("maxnum", largest, size), add("add", total, size)
+        # NaN stays in a sum, but not in the largest
+        largest = add("add", largest, add("mul", self.instructions.add_constant(NAN_PROBE), total))
         clear = self.instructions.add_constant(1.0)
-        for k, bend in enumerate(way.bends):
-            own = add("sub", self.instructions.add_constant(1.0), bend)
-            clear = add("minnum", clear, own) if k else own
-        return [left, clear]
+        for k, coalescence in enumerate(assembly.coalescences):
+            distance = add("sub", self.instructions.add_constant(1.0), coalescence)
+            clear = add("minnum", clear, distance) if k else distance
+        return [largest, clear]
 
-    def rates(self, way: SymbolicAssembly) -> list[list[int]]:
+    def rates(self, assembly: SymbolicAssembly) -> list[list[int]]:
         """x', y', angle', then the second ones of every inner link."""
         e, (u1, u2) = self.equations, self.symbols[2:]
         z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
         y, y1, y2 = e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2)
-        w = e.w[: 3 * len(self.block_equations.inner_links)]
+        w = e.w[: 3 * len(self.block_type.inner_links)]
         both = ca.vertcat(*first_and_second_rates(w, y, y1, y2))
-        values = self._inline((), [both], way.z)
-        many = 3 * len(self.block_equations.inner_links)
-        return [values[3 * k : 3 * k + 3] + values[many + 3 * k : many + 3 * k + 3] for k in range(many // 3)]
+        values = self._inline((), [both], assembly.z)
+        count = 3 * len(self.block_type.inner_links)
+        return [values[3 * k : 3 * k + 3] + values[count + 3 * k : count + 3 * k + 3] for k in range(count // 3)]
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
         """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
         add, mul = self.instructions.add, partial(self.instructions.add, "mul")
-        whole = self.instructions.add_constant(0.0)
-        for (x, y, c, s), (many, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
+        total = self.instructions.add_constant(0.0)
+        for (x, y, c, s), (count, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
             square = add("add", mul(x, x), mul(y, y))
-            turned = add("sub", mul(c, px), mul(s, py)), add("add", mul(s, px), mul(c, py))
-            mixed = add("add", mul(x, add("sub", turned[0], tx)), mul(y, add("sub", turned[1], ty)))
+            rotated = add("sub", mul(c, px), mul(s, py)), add("add", mul(s, px), mul(c, py))
+            mixed = add("add", mul(x, add("sub", rotated[0], tx)), mul(y, add("sub", rotated[1], ty)))
             mixed = add("sub", mixed, add("add", mul(c, along), mul(s, across)))
-            own = add("add", add("add", mul(many, square), add("add", mixed, mixed)), squares)
-            whole = add("add", whole, own)
-        return whole
+            link_sum = add("add", add("add", mul(count, square), add("add", mixed, mixed)), squares)
+            total = add("add", total, link_sum)
+        return total
 
-    def nearest_way(self, ways: Sequence[_StartWay]) -> list[int]:
+    def nearest_mode(self, modes: Sequence[_StartMode]) -> list[int]:
         """The outputs of the assembly mode nearest to the sketch, its squared distance, the next squared distance, and
         the least distance measure of any mode from a dead point. A mode that cannot be assembled is `FAR_AWAY`."""
         add = self.instructions.add
         far = self.instructions.add_constant(FAR_AWAY)
         distances = []
-        for way in ways:
-            is_joined = add("less", way.left, far)
+        for mode in modes:
+            is_joined = add("less", mode.residual, far)
             distances.append(
-                add("add", add("where", is_joined, way.distance), add("where", add("not", is_joined), far))
+                add("add", add("where", is_joined, mode.distance), add("where", add("not", is_joined), far))
             )
-        outputs, nearest, second, clear = ways[0].outputs, distances[0], far, add("abs", ways[0].clear)
-        for way, distance in zip(ways[1:], distances[1:], strict=True):
+        outputs, nearest, second, clear = modes[0].outputs, distances[0], far, add("abs", modes[0].clear)
+        for mode, distance in zip(modes[1:], distances[1:], strict=True):
             is_nearer = add("less", distance, nearest)
             stays = add("not", is_nearer)
             outputs = [
                 add("add", add("where", is_nearer, new), add("where", stays, old))
-                for new, old in zip(way.outputs, outputs, strict=True)
+                for new, old in zip(mode.outputs, outputs, strict=True)
             ]
             second = add("minnum", second, add("maxnum", nearest, distance))
             nearest = add("minnum", nearest, distance)
-            clear = add("minnum", clear, add("abs", way.clear))
+            clear = add("minnum", clear, add("abs", mode.clear))
         return [*outputs, nearest, second, clear]
 
     def make_formula(self, wanted: list[int]) -> BlockFormula:
@@ -406,97 +476,10 @@ class FormulaBuilder:
         return BlockFormula(made, tuple(numbers), leaves)
 
 
-MAX_SIGNS = 2
-"""Signs of a kind in closed form at most."""
-MAX_BLOCK_TYPES = 1024
-"""Kinds that are kept."""
-
-
-class BlockType(BlockEquations):
-    """One kind of groups with its formulas: `direct` ones are in closed form, Newton's method follows others."""
-
-    def __init__(self, signature: BlockSignature, samples: Sequence[Pair]):
-        super().__init__(signature, samples)
-        self.has_closed_form = (
-            self.is_square and self.sign_count <= MAX_SIGNS and all(each is not None for each in self.closed_forms)
-        )
-        if self.has_closed_form:
-            try:
-                self.start_formula, self.run_formula(False)
-            except UnsupportedOperation:
-                self.has_closed_form = False
-        self.has_newton_formulas = False
-        "whether Newton's method can follow it, where it is not in closed form"
-        if self.is_square and not self.has_closed_form:
-            with suppress(UnsupportedOperation):
-                self.has_newton_formulas = self.newton_formulas is not None
-
-    @property
-    def start_formula(self) -> BlockFormula:
-        """(given links and inputs, numbers with sums of the sketch) -> of the way to assemble the block that is nearest
-        to the sketch its inner links' x, y, cos and sin, then its signs, its squared distance and that of the next,
-        what is left open, and how far from where two ways meet any is."""
-        if self._start_formula is None:
-            work = FormulaBuilder(self)
-            first = len(self.measures) + 2 * len(self.angle_measures)
-            sums = [
-                [work.add_input("p", first + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)]
-                for k in range(len(self.inner_links))
-            ]
-            ways = []
-            for signs in product((1.0, -1.0), repeat=self.sign_count):
-                own = [work.instructions.add_constant(sign) for sign in signs]
-                way = work.closed_form_assembly(own)
-                poses = work.poses(way)
-                left, clear = work.acceptance_values(way, work.residuals(way, poses))
-                outputs = [*(number for pose in poses for number in pose), *own, left]
-                ways.append(_StartWay(outputs, work.sketch_distance(poses, sums), left, clear))
-            *outputs, left, nearest, second, least_clear = work.nearest_way(ways)
-            self._start_formula = work.make_formula([*outputs, nearest, second, left, least_clear])
-        return self._start_formula
-
-    _start_formula: BlockFormula | None = None
-
-    @property
-    def newton_formulas(self) -> NewtonFormulas:
-        """The formulas by which Newton's method follows a kind that is not in closed form. Raises
-        UnsupportedOperation."""
-        if self._newton_formulas is None:
-            self._newton_formulas = NewtonFormulas(
-                *(FormulaBuilder(self).newton_formula(what) for what in (None, False, True))
-            )
-        return self._newton_formulas
-
-    _newton_formulas: NewtonFormulas | None = None
-
-    def run_formula(self, rates: bool, polished: bool = False) -> BlockFormula:
-        """(given links and inputs, numbers) -> rows of the inner links, then what is left open, and how far from where
-        two ways to assemble it meet."""
-        if (rates, polished) not in self._run_formulas:
-            work = FormulaBuilder(self)
-            signs = [
-                work.add_input("p", len(self.measures) + 2 * len(self.angle_measures) + k)
-                for k in range(self.sign_count)
-            ]
-            way = work.closed_form_assembly(signs, polished)
-            poses = rows = work.poses(way)
-            if rates:
-                rows = [[*pose, *more] for pose, more in zip(poses, work.rates(way), strict=True)]
-            wanted = [each for pose in rows for each in pose]
-            self._run_formulas[rates, polished] = work.make_formula(
-                [*wanted, *work.acceptance_values(way, work.residuals(way, poses))]
-            )
-        return self._run_formulas[rates, polished]
-
-    @property
-    def _run_formulas(self) -> dict[tuple[bool, bool], BlockFormula]:
-        return self.__dict__.setdefault("_runs", {})
-
-
 @lru_cache(maxsize=MAX_BLOCK_TYPES)
 def find_block_type(signature: BlockSignature) -> BlockType:
-    """The kind of a signature; equal ones are one."""
-    return BlockType(signature, [_sample_pair(joint.type) for joint in signature.pairs])
+    """The block type of a signature; equal signatures have the same."""
+    return BlockType(signature)
 
 
 @lru_cache
@@ -505,19 +488,21 @@ def _sample_pair(type_: type[Pair]) -> Pair:
 
 
 def write_formula(inputs: Sequence[Sequence[FormulaInput]], write: Callable[..., Sequence[ca.SX]]) -> BlockFormula:
-    """The formula of what is written of groups of inputs, each a column."""
+    """The formula of what `write` returns for groups of inputs, each a column."""
     listing: InstructionList[FormulaInput] = InstructionList()
-    symbols = [ca.SX.sym(f"of{k}", len(own)) for k, own in enumerate(inputs)]
+    symbols = [ca.SX.sym(f"of{k}", len(group)) for k, group in enumerate(inputs)]
     function = ca.Function("written", symbols, [ca.densify(ca.vertcat(*write(*symbols)))], {"cse": True})
-    (wanted,) = inline_function(listing, function, [[listing.add_input(each) for each in own] for own in inputs])
-    leaves = {k: key for k in required_values(listing, wanted) if (key := listing.instructions[k].key) is not None}
-    return BlockFormula(listing, tuple(wanted), leaves)
+    (outputs,) = inline_function(listing, function, [[listing.add_input(each) for each in group] for group in inputs])
+    leaves = {k: key for k in required_values(listing, outputs) if (key := listing.instructions[k].key) is not None}
+    return BlockFormula(listing, tuple(outputs), leaves)
 
 
 class NewtonFormulas(NamedTuple):
-    """(given links and inputs, numbers, unknowns: the cosine and sine of angles, or a length and nothing) -> `step`: by
-    how much Newton's method goes back, and the square of how regular the slope is; `told` and `moving`: rows of the
-    inner links, without and with rates, and what is left open."""
+    """Functions of given links and inputs, numbers, and unknowns (the cosine and sine of angles, or a length and 0).
+
+    `step`: the step of Newton's method to subtract, and the square of the regularity of the Jacobian; `poses` and
+    `poses_and_rates`: rows of the inner links, and the largest residual.
+    """
 
     step: BlockFormula
     poses: BlockFormula

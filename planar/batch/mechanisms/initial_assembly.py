@@ -1,8 +1,8 @@
-"""The assemblies nearest to their sketches of many linkages at once, block after block."""
+"""The assemblies of linkages nearest to their sketches, block after block."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,59 +18,48 @@ from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
 
 LEAST_CLEARANCE = 1e-4
-"""Nearer than this to where two assemblies meet neither is taken."""
+"""Minimum distance measure from a dead point of an assembly that is taken."""
 SKETCH_DISTANCE_RATIO = 0.075
 """Largest mean distance of points from the sketch (sizes), divided by the regularity of the Jacobian, at which no other
 assembly is nearer."""
 START_TOLERANCE_FACTOR = 100.0
-"""How much more may be left open at a start, which is looked at again in the run."""
-MAX_UNKNOWNS = 24
-"""Unknowns of a group at most."""
+"""Factor of the residual tolerance at a start, which the run checks again."""
 LEAST_SPREAD = 1e-12
-"""Squared sizes: points of a link that are no farther apart show no angle."""
+"""Squared sizes: points of a link that are nearer to each other define no angle."""
 
 
-class StartAssemblies(NamedTuple):
-    """For every linkage whether its assembly is certainly the one that a search of the mechanism returns (linkages,),
-    and the signs of all blocks (blocks, MAX_SIGNS), or the unknowns of those that Newton's method follows (blocks,
-    MAX_UNKNOWNS)."""
-
-    is_sure: BoolArray
-    signs: Array
-    z: Array
-
-
-def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
-    """See `StartAssemblies`.
+def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Array]]:
+    """Whether the assembly of each linkage is surely the one that a search of the mechanism returns (linkages,), and
+    of every batch the numbers of its blocks for the run: p, then signs or unknowns (blocks, numbers).
 
     An assembly mode of a block is accepted if every other mode is farther from the sketch by more than the distance of
     all blocks of the linkage together: every other choice gives a larger total distance. Newton's method solves blocks
     without closed form from the sketch; they are accepted if their points are near the sketch and the Jacobian is so
     regular that no other assembly is as near, see `BlockAssemblies`.
     """
-    linkage_count, blocks = len(linkages), linkages.block_count
+    linkage_count = len(linkages)
     starts = _Starts(linkages)
     is_sure = starts.run(np.full(linkage_count, LEAST_CLEARANCE))
     if starts.take_solved_frames():
         is_sure = starts.run(np.full(linkage_count, LEAST_CLEARANCE))
     cost, clearance = np.zeros(linkage_count), np.full(linkage_count, LEAST_CLEARANCE)
-    margins: list[tuple[Array, Array]] = []
-    signs, z = np.ones((blocks, MAX_SIGNS)), np.zeros((blocks, MAX_UNKNOWNS))
+    margins: list[tuple[IntArray, Array]] = []
+    block_numbers: list[Array] = []
     for batch in linkages.batches:
-        kind, owner, numbers = batch.block_type, batch.owner, batch.block_numbers
+        kind, owner = batch.block_type, batch.owner
         if kind.has_closed_form:
-            rows = starts.judgements[numbers, :, 0]
-            signs[numbers, : kind.sign_count] = rows[:, : kind.sign_count]
+            rows = starts.judgements[batch.block_numbers, :, 0]
+            block_numbers.append(np.hstack([batch.p, rows[:, : kind.sign_count]]))
             nearest, second, residual, clear = rows[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
             with np.errstate(invalid="ignore"):
                 is_good = residual <= START_TOLERANCE_FACTOR * linkages.tolerance[owner]
                 is_good &= ~(clear < LEAST_CLEARANCE)
-            # what can be assembled in one way alone may lie far off where others are
+            # a block with a single assembly mode may lie far off its sketch
             distance = np.where(is_good, np.maximum(nearest, 0.0), 0.0)
             margins.append((owner, second - nearest))
         else:
             shown = starts.shown[kind]
-            z[numbers, : shown.unknowns.shape[1]] = shown.unknowns
+            block_numbers.append(newton_numbers(kind, batch.p, shown.unknowns))
             distance, points = starts.distance_to_sketch(batch)
             is_good = shown.is_shown & (points > 0.0) & is_at_sketch(distance, points)
             needed = distance / np.maximum(points, 1.0) / SKETCH_DISTANCE_RATIO**2
@@ -81,7 +70,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> StartAssemblies:
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     if np.any(clearance > LEAST_CLEARANCE):
         is_sure &= starts.run(clearance)
-    return StartAssemblies(is_sure, signs, z)
+    return is_sure, block_numbers
 
 
 JUDGED_ROWS = 4
@@ -95,35 +84,31 @@ class _ShownBlocks(NamedTuple):
     is_shown: BoolArray
 
 
-def _start_number_count(batch: BlockBatch) -> int:
-    """The numbers of a block at its start: those of its pairs, then sums of the sketch or unknowns."""
-    kind = batch.block_type
-    added = SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle)
-    return int(batch.p.shape[1]) + added
-
-
 class _Starts:
-    """The blocks of linkages as a tape of one step, with the places of all links in a state of its own."""
+    """The blocks of linkages as a tape of one step, with the places of all links in a separate state."""
 
     def __init__(self, linkages: LinkageArrays):
         self.linkages, blocks = linkages, linkages.block_count
         self.first = part_offsets(linkages.link_counts)
         self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
         _fill_inputs(self.state, linkages, self.first)
-        self.sums = _sketch_sums(linkages.sketch, self.first)
+        self.sums = _sketch_sums(linkages.sketch_points([one.sketch for one in linkages.structures]), self.first)
         self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-        self.places = {
-            block_batch.block_type: block_batch.state_indices(self.first) for block_batch in linkages.batches
-        }
+        self.places = {batch.block_type: batch.state_indices(self.first) for batch in linkages.batches}
         self.shown: dict[BlockType, _ShownBlocks] = {}
-        owner, self.kinds = np.zeros((2, blocks), dtype=np.int64)
-        slot_count = 1 + max(block_batch.block_type.slot_count for block_batch in linkages.batches)
+        self.kinds = np.zeros(blocks, dtype=np.int64)
+        slot_count = 1 + max(kind.slot_count for kind in self.places)
         self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
-        self.p = np.zeros((blocks, max(map(_start_number_count, linkages.batches))))
+        number_counts = (
+            kind.number_count
+            + (SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle))
+            for kind in self.places
+        )
+        self.p = np.zeros((blocks, max(number_counts)))
         self.functions = []
         for kind_number, batch in enumerate(linkages.batches):
             kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            owner[indices], self.kinds[indices] = batch.owner, kind_number
+            self.kinds[indices] = kind_number
             self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
             if kind.has_closed_form:
                 self.slots[indices, kind.slot_count] = (
@@ -137,7 +122,6 @@ class _Starts:
             else:
                 self.slots[indices, kind.slot_count] = self.table.ctypes.data
                 self.functions.append(compile_newton_block(kind, False))
-        self.begins = part_offsets(np.bincount(owner, minlength=len(linkages)))
         if not all(batch.block_type.has_closed_form for batch in linkages.batches):
             self.frames = _shown_frames(linkages, self.first)
             self._take_frames()
@@ -145,7 +129,7 @@ class _Starts:
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
         tolerance = START_TOLERANCE_FACTOR * self.linkages.tolerance
-        tape = Tape(self.begins, self.kinds, self.slots, self.p, tolerance, clearance)
+        tape = Tape(self.linkages.first_block, self.kinds, self.slots, self.p, tolerance, clearance)
         return run_tape(self.functions, 1, tape).good > 0
 
     def take_solved_frames(self) -> bool:
@@ -196,7 +180,8 @@ class _ShownFrames(NamedTuple):
 
 def _shown_frames(linkages: LinkageArrays, first: IntArray) -> _ShownFrames:
     """By the points of links, two at least that lie apart; the mechanism's frame is where it is."""
-    counts, px, py, tx, ty, along, across, _ = _sketch_sums(linkages.shown_points, first).T
+    points = linkages.sketch_points([one.shown_points for one in linkages.structures])
+    counts, px, py, tx, ty, along, across, _ = _sketch_sums(points, first).T
     divisor = np.maximum(counts, 1.0)
     turn = along - (px * tx + py * ty) / divisor, across - (px * ty - py * tx) / divisor
     is_shown = (counts > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
@@ -213,45 +198,44 @@ def _frame_through(angle: Array, local: Array, world: Array) -> Frame:
 
 
 class _Slide(NamedTuple):
-    """A pair with own coordinates between links of a kind, and its numbers (blocks,)."""
+    """A pair with coordinates between links of a block type, and its numbers (blocks,)."""
 
     pair: Any
     numbers: list[Array]
 
-    def residual(self, frames: Sequence[Frame], coordinates: Sequence[float]) -> list[Array]:
-        """What the pair leaves open about these frames."""
-        return list(self.pair.residual(frames, self.numbers, coordinates))
+    def residual(self, frames: Mapping[str, Frame], unit_coordinate: int | None = None) -> list[Array]:
+        """The residual of the pair with links at these frames, all coordinates 0 but for one that is 1."""
+        coordinates = [float(k == unit_coordinate) for k in range(len(self.pair.coordinate_kinds))]
+        return list(self.pair.residual([frames[link] for link in self.pair.bodies], self.numbers, coordinates))
 
 
-def _unknowns_from_frames(block_type: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
+def _unknowns_from_frames(kind: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
     """The unknowns of blocks whose links are shown so; p (blocks, numbers). Lengths of slides are read off the frames,
     in which they are linear."""
-    kind, slides, first = block_type, list[_Slide](), 0
+    slides, first = list[_Slide](), 0
     for pair in kind.mechanism.pairs:
         if pair.coordinate_kinds:
             slides.append(_Slide(pair, [p[:, first + k] for k in range(len(pair.number_kinds))]))
         first += len(pair.number_kinds)
     slots = [*range(len(kind.given_links)), *range(kind.slot_count)[-len(kind.inner_links) :]]
-    of, known = {"frame": GROUND}, {"frame": np.ones(len(p), dtype=bool)}
+    frames, known = {"frame": GROUND}, {"frame": np.ones(len(p), dtype=bool)}
     places = {name: index[:, slot] for name, slot in zip((*kind.given_links, *kind.inner_links), slots, strict=True)}
     for name, indices in places.items():
-        of[name] = Frame(*(part[indices] for part in shown.frame[:5]))
+        frames[name] = Frame(*(part[indices] for part in shown.frame[:5]))
         known[name] = (shown.is_known if name in kind.given_links else shown.is_shown)[indices]
     for slide in slides * 2:
-        _align_slider(slide, kind, shown, places, of, known)
+        _align_slider(slide, kind, shown, places, frames, known)
     needed = kind.inner_links if all(kind.unknown_is_angle) else places
     is_shown = np.logical_and.reduce([known[name] for name in needed])
     unknowns: dict[tuple[str, str], Array] = {}
     for slide in slides:
-        bodies, coordinate_count = [of[link] for link in slide.pair.bodies], len(slide.pair.coordinate_kinds)
-        still = np.array(slide.residual(bodies, [0.0] * coordinate_count)[:2])
+        constant = np.array(slide.residual(frames)[:2])
         for k, (part, _) in enumerate(slide.pair.coordinate_kinds):
-            direction = np.array(slide.residual(bodies, [float(j == k) for j in range(coordinate_count)])[:2]) - still
+            direction = np.array(slide.residual(frames, k)[:2]) - constant
             with np.errstate(invalid="ignore"):  # of links that are not shown
-                unknowns[slide.pair.name, part] = -np.sum(direction * still, axis=0) / np.sum(
-                    direction * direction, axis=0
-                )
-    unknowns |= {(name, "angle"): of[name].angle for name in kind.inner_links}
+                length = -np.sum(direction * constant, axis=0) / np.sum(direction * direction, axis=0)
+            unknowns[slide.pair.name, part] = length
+    unknowns |= {(name, "angle"): frames[name].angle for name in kind.inner_links}
     e = kind.equations
     names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
     return _ShownBlocks(np.stack([unknowns[name] for name in names], axis=1), is_shown)
@@ -262,28 +246,26 @@ def _align_slider(
     kind: BlockType,
     shown: _ShownFrames,
     places: Mapping[str, IntArray],
-    of: dict[str, Frame],
+    frames: dict[str, Frame],
     known: dict[str, BoolArray],
 ) -> None:
-    """A link of which one point alone is shown, and that a slide holds at an angle to one that is known."""
+    """Place a link of which a single point is shown, if a slide fixes its angle to a known link."""
     if MeasureKind.ANGLE not in slide.pair.residual_kinds:
         return
-    row, coordinates = slide.pair.residual_kinds.index(MeasureKind.ANGLE), [0.0] * len(slide.pair.coordinate_kinds)
+    row = slide.pair.residual_kinds.index(MeasureKind.ANGLE)
     for link, other in (slide.pair.bodies, slide.pair.bodies[::-1]):
         if link not in kind.inner_links:
             continue
         local, world = shown.local[:, places[link]], shown.world[:, places[link]]
-        is_found = ~known[link] & known[other] & np.isfinite(local[0])
-        if is_found.any():
-            still, turned = (
-                slide.residual(
-                    [frame_at(0.0, 0.0, angle) if body == link else of[body] for body in slide.pair.bodies], coordinates
-                )[row]
-                for angle in (0.0, 1.0)
+        is_aligned = ~known[link] & known[other] & np.isfinite(local[0])
+        if is_aligned.any():
+            constant, rotated = (
+                slide.residual({**frames, link: frame_at(0.0, 0.0, angle)})[row] for angle in (0.0, 1.0)
             )
-            slider_frame = _frame_through(still / (still - turned), local, world)
-            pairs = zip(slider_frame[:5], of[link][:5], strict=True)
-            of[link], known[link] = Frame(*(np.where(is_found, *both) for both in pairs)), known[link] | is_found
+            slider_frame = _frame_through(constant / (constant - rotated), local, world)
+            parts = zip(slider_frame[:5], frames[link][:5], strict=True)
+            frames[link] = Frame(*(np.where(is_aligned, *both) for both in parts))
+            known[link] |= is_aligned
 
 
 def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:
@@ -296,12 +278,11 @@ def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None
 
 
 def _sketch_sums(points: PointArrays, first: IntArray) -> Array:
-    """The sums of points of every place (places, STATISTICS)."""
+    """The sums of the points of every place (places, SKETCH_SUMS)."""
     px, py, tx, ty = points.numbers.T
     along, across = px * tx + py * ty, px * ty - py * tx
     squares = px * px + py * py + tx * tx + ty * ty
-    where = first[points.owner] + points.link_index
-    parts = (np.ones_like(px), px, py, tx, ty, along, across, squares)
-    stats = [np.bincount(where, part, 1 + first[-1]) for part in parts]
-    assert len(stats) == SKETCH_SUMS
-    return np.stack(stats, axis=1)
+    terms = np.array([np.ones_like(px), px, py, tx, ty, along, across, squares])
+    bins = (first[points.owner] + points.link_index) * SKETCH_SUMS + np.arange(SKETCH_SUMS)[:, None]
+    sums = np.bincount(bins.ravel(), terms.ravel(), (1 + first[-1]) * SKETCH_SUMS)
+    return np.asarray(sums.reshape(-1, SKETCH_SUMS), dtype=float)

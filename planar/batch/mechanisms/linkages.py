@@ -2,40 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.mechanisms.block_type import BlockType
-from planar.batch.mechanisms.partition import NotPartitionable, Partition, partition_mechanism
-from planar.batch.stop_checks import watched_links
+from planar.batch.mechanisms.partition import (
+    BlockRows,
+    NotPartitionable,
+    PointLayout,
+    Structure,
+    partition_mechanism,
+)
+from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointPlacementError
-from planar.model.mechanism import Mechanism, named_points, running_input_index
-from planar.model.pairs import MeasureKind as Measure
+from planar.model.mechanism import Mechanism, relative_motions, running_input_index
+from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
-Array = np.ndarray
+class SweepRequest(NamedTuple):
+    """What `sweep_each` asks of every mechanism."""
+
+    steps: int
+    points: tuple[str, ...] | None
+    rates: bool
+    pair: str | None
 
 
 @dataclass(frozen=True, eq=False)
 class BlockBatch:
-    """Blocks of one kind: `owner` (blocks,) whose they are, rising; `link_indices` (blocks, slots) where their links
-    are; p (blocks, numbers) with the cosine and sine of angles, lengths in sizes; `block_numbers` (blocks,), through
-    all linkages."""
+    """Blocks of one type: `owner` (blocks,) the linkage of each, rising; `link_indices` (blocks, slots) the places of
+    their links; p (blocks, numbers) with the cosine and sine of angles, lengths in sizes; `block_numbers` (blocks,)
+    among those of all linkages."""
 
     block_type: BlockType
-    owner: Array
-    link_indices: Array
+    owner: IntArray
+    link_indices: IntArray
     p: Array
-    block_numbers: Array
+    block_numbers: IntArray
 
-    def state_indices(self, first: Array) -> Array:
-        """The places among those of all linkages, of which each has its own from `first` on; 0 is the frame of all."""
+    def state_indices(self, first: IntArray) -> IntArray:
+        """The places among those of all linkages, of which linkage k has those after first[k]; 0 is the frame of
+        all."""
         return np.where(self.link_indices > 0, self.link_indices + first[self.owner][:, None], 0)
 
     @property
@@ -45,14 +57,14 @@ class BlockBatch:
 
 
 class InputArrays(NamedTuple):
-    """The inputs of all linkages: whose, their place, position (rad or sizes), whether an angle, velocity and
-    acceleration of those that run, and which do."""
+    """The inputs of all linkages: linkage, place, position (rad or sizes), whether it is an angle, whether it runs,
+    velocity and acceleration."""
 
-    owner: Array
-    link_index: Array
+    owner: IntArray
+    link_index: IntArray
     value: Array
-    is_angle: Array
-    runs: Array
+    is_angle: BoolArray
+    runs: BoolArray
     velocity: Array
     acceleration: Array
 
@@ -62,247 +74,207 @@ class InputArrays(NamedTuple):
 
 
 class PointArrays(NamedTuple):
-    """Points on links: whose, the place of the link, and numbers (points, any) of each."""
+    """Points on links: the linkage, the place of the link, and numbers (points, any) of each."""
 
-    owner: Array
-    link_index: Array
+    owner: IntArray
+    link_index: IntArray
     numbers: Array
+
+    def followed_by(self, others: PointArrays) -> PointArrays:
+        """These points, then others."""
+        owner, link_index = (np.concatenate([self[part], others[part]]) for part in (0, 1))
+        return PointArrays(owner, link_index, np.concatenate([self.numbers, others.numbers]))
 
 
 @dataclass(frozen=True, eq=False)
 class LinkageArrays:
-    """Linkages as arrays. `link_counts` (linkages,): how many links and inputs each has beside the frame; lengths in
-    units of `unit` (m).
+    """Linkages as arrays, lengths in units of `unit` (m).
 
-    `batches`: one of each kind; the blocks of a linkage are solved in the order of their numbers. `sketch`: x and y in
-    the link, and where it is shown (sizes). `points`: x and y in the link (m), of those that are wanted.
-    `shown_points`: as `sketch`, for every link that has a point, and pins on the frame too.
+    `which` (linkages,) are their numbers in a part, `numbers` those of all linkages, of linkage k after
+    first_number[k]; `start` (linkages,) the position of the input that runs (rad), `tolerance` that of residuals,
+    `link_counts` how many links and inputs each has beside the frame. `batches`: one of each block type; the blocks of
+    a linkage are solved in the order of their numbers. `watched_points`: two of each link that decides where a pair
+    with stops is, x and y in the link (m): the origin of its axes and the place at the size on the x-axis.
     """
 
-    link_counts: Array
+    mechanisms: Sequence[Mechanism]
+    structures: Sequence[Structure]
+    which: IntArray
+    numbers: Array
+    first_number: IntArray
+    start: Array
+    link_counts: IntArray
     unit: Array
     tolerance: Array
     batches: Sequence[BlockBatch]
+    first_block: IntArray
     inputs: InputArrays
-    sketch: PointArrays
-    points: PointArrays
-    shown_points: PointArrays
-    block_count: int
+    watched_points: PointArrays
 
     def __len__(self) -> int:
         """How many linkages there are."""
         return len(self.link_counts)
 
+    @property
+    def block_count(self) -> int:
+        """How many blocks all linkages have."""
+        return int(self.first_block[-1])
 
-class PartitionedLinkage(NamedTuple):
-    """A parted linkage with what runs it: of every input position (rad or sizes), whether it is an angle, whether it
-    runs, velocity and acceleration; points of the sketch, points that are wanted, and points that are
-    shown, each with its place first: see `LinkageArrays`."""
+    def points(self, names: Sequence[Sequence[str]]) -> PointArrays:
+        """Points of every linkage by their names: x and y in the link (m)."""
+        parts = [[one.members[name][0] for name in own] for one, own in zip(self.structures, names, strict=True)]
+        owner, point = _concatenate([np.array(part, dtype=np.int64) for part in parts])
+        link_index = np.concatenate([one.point_places[part] for one, part in zip(self.structures, parts, strict=True)])
+        first = 2 * point + self.first_number[owner]
+        return PointArrays(owner, link_index, np.array([self.numbers[first], self.numbers[first + 1]]).T)
 
-    partition: Partition
-    inputs: list[tuple[float, bool, bool, float, float]]
-    sketch: list[tuple[float, ...]]
-    points: list[tuple[float, ...]]
-    shown_points: list[tuple[float, ...]]
+    def sketch_points(self, layouts: Sequence[PointLayout]) -> PointArrays:
+        """Points of every linkage by a layout of its structure: x and y in the link, and in the world (sizes)."""
+        owner, link_index = _concatenate([layout.link_index for layout in layouts])
+        places = (np.concatenate(parts) for parts in zip(*(layout[1:] for layout in layouts), strict=True))
+        first = [part + self.first_number[owner] for part in places]
+        coordinates = np.array([self.numbers[row + part] for row in first for part in (0, 1)])
+        return PointArrays(owner, link_index, (coordinates / self.unit[owner]).T)
+
+    def links_of_block(self, number: int) -> str:
+        """The names of the inner links of a block."""
+        owner = int(np.searchsorted(self.first_block, number, side="right")) - 1
+        return ", ".join(self.structures[owner].blocks[number - self.first_block[owner]].inner_links)
 
 
-_BlockRow = tuple[int, Sequence[int], Sequence[float], int]
-"""A block: its owner, where its links are, the numbers of its pairs (m, rad), its number."""
+class _Row(NamedTuple):
+    """A mechanism by its number, its structure, which input runs, and where its numbers begin."""
+
+    number: int
+    mechanism: Mechanism
+    structure: Structure
+    running: int
+    first: int
 
 
-def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays:
-    """Parted linkages as arrays."""
-    unit = np.array([one.partition.unit for one in linkages])
-    rows: dict[int, list[_BlockRow]] = {}
-    kinds: dict[int, BlockType] = {}
-    number = 0
-    for owner, one in enumerate(linkages):
-        for group in one.partition.blocks:
-            kinds[id(group.block_type)] = group.block_type
-            rows.setdefault(id(group.block_type), []).append((owner, group.link_indices, group.p, number))
-            number += 1
+def make_linkage_arrays(mechanisms: Mapping[int, Mechanism], pair: str | None) -> LinkageArrays | None:
+    """Those of the mechanisms, by their numbers, that can be solved block after block, with the input that runs at
+    `pair`; None if there are none."""
+    rows: list[_Row] = []
+    numbers: list[float] = []
+    for k, mechanism in mechanisms.items():
+        running = running_input_index(mechanism, pair, "inputs")
+        try:
+            structure, mechanism_numbers = partition_mechanism(mechanism)
+        except (NotPartitionable, BadInput, PointPlacementError):
+            continue
+        if structure.input_is_angle[running]:
+            rows.append(_Row(k, mechanism, structure, running, len(numbers)))
+            numbers += mechanism_numbers
+    if not rows:
+        return None
+    values = np.array(numbers, dtype=float)
+    unit, reach = _sizes(rows, values)
+    has_short_arm = _has_short_arm(rows, values, unit)
+    if has_short_arm.any():
+        kept = np.flatnonzero(~has_short_arm)
+        rows, unit, reach = [rows[k] for k in kept.tolist()], unit[kept], reach[kept]
+    return _make_arrays(rows, values, unit, reach) if rows else None
 
-    batches = []
-    for key, own in rows.items():
-        owners, places, p, block_numbers = zip(*own, strict=True)
-        batches.append(make_batch(kinds[key], owners, places, p, block_numbers, unit))
-    inputs = [(owner, 1 + k, *each) for owner, one in enumerate(linkages) for k, each in enumerate(one.inputs)]
-    parts = zip(*inputs, strict=True)
+
+def _concatenate(parts: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
+    """The part that every entry is from (entries,), and the entries of all parts."""
+    return np.repeat(np.arange(len(parts)), [len(part) for part in parts]), np.concatenate(parts)
+
+
+def _sizes(rows: Sequence[_Row], values: Array) -> tuple[Array, Array]:
+    """The greatest extent of a link of each linkage, and the greatest coordinate (m)."""
+    counts = [len(row.structure.point_places) for row in rows]
+    owner, point = _concatenate([np.arange(count) for count in counts])
+    first = np.array([row.first for row in rows])[owner] + 2 * point
+    link_owner, starts = _concatenate([row.structure.link_starts for row in rows])
+    starts = starts + part_offsets(counts)[link_owner]
+    unit, reach = np.zeros((2, len(rows)))
+    if len(owner):
+        sides = []
+        for coordinates in (values[first], values[first + 1]):
+            np.maximum.at(reach, owner, np.abs(coordinates))
+            sides.append(np.maximum.reduceat(coordinates, starts) - np.minimum.reduceat(coordinates, starts))
+        np.maximum.at(unit, link_owner, list(map(hypot, *(side.tolist() for side in sides))))
+    return np.where(unit > 0.0, unit, 1.0), reach
+
+
+def _has_short_arm(rows: Sequence[_Row], values: Array, unit: Array) -> BoolArray:
+    """Which linkages have a link whose arm between the pins that place it is so short that rounding takes digits of
+    its angle (linkages,)."""
+    owner, ends = _concatenate([row.structure.arms for row in rows])
+    first = 2 * ends + np.array([row.first for row in rows])[owner][:, None]
+    x, y = (values[first + part] for part in (0, 1))
+    length = np.hypot(x[:, 1] - x[:, 0], y[:, 1] - y[:, 0])
+    is_short = np.zeros(len(rows), dtype=bool)
+    is_short[owner[(length > 0.0) & (length < SHORT_ARM * unit[owner])]] = True
+    return is_short
+
+
+def _make_arrays(rows: Sequence[_Row], values: Array, unit: Array, reach: Array) -> LinkageArrays:
+    structures, first = [row.structure for row in rows], np.array([row.first for row in rows])
+    first_block = part_offsets([len(structure.blocks) for structure in structures])
+
     return LinkageArrays(
-        np.array([one.partition.index_count - 1 for one in linkages]),
+        [row.mechanism for row in rows],
+        structures,
+        np.array([row.number for row in rows]),
+        values,
+        first,
+        np.array([row.mechanism.inputs[row.running].position for row in rows]),
+        np.array([one.place_count - 1 for one in structures]),
         unit,
-        np.array([one.partition.tolerance for one in linkages]),
-        batches,
-        InputArrays(*(np.array(part) for part in parts)),
-        _point_arrays([one.sketch for one in linkages], 4),
-        _point_arrays([one.points for one in linkages], 2),
-        _point_arrays([one.shown_points for one in linkages], 4),
-        number,
+        residual_tolerance(np.array([len(one.link_index) for one in structures]), reach / unit),
+        list(_make_batches(structures, first_block, values, first, unit)),
+        first_block,
+        _input_arrays(rows, unit),
+        _watched_points(rows, unit),
     )
 
 
-def make_batch(
-    block_type: BlockType,
-    owner: ArrayLike,
-    link_indices: ArrayLike,
-    p: ArrayLike,
-    block_numbers: ArrayLike,
-    unit: Array,
-) -> BlockBatch:
-    """Groups of a kind with the numbers of their pairs p (groups, measures), in m, as the kind's formulas take them."""
-    owners = np.asarray(owner)
-    numbers = np.array(p, dtype=float).reshape(len(owners), len(block_type.measures))
-    numbers[:, block_type.length_measures] /= unit[owners][:, None]
-    if block_type.angle_measures:
-        own = numbers[:, block_type.angle_measures]
-        both = np.stack([np.cos(own), np.sin(own)], axis=2).reshape(len(owners), -1)
-        numbers = np.hstack([numbers, both])
-    return BlockBatch(
-        block_type,
-        owners,
-        np.asarray(link_indices).reshape(len(owners), block_type.slot_count),
-        numbers,
-        np.asarray(block_numbers),
-    )
+def _make_batches(
+    structures: Sequence[Structure], first_block: IntArray, values: Array, first: IntArray, unit: Array
+) -> Iterator[BlockBatch]:
+    """The blocks of all linkages, type after type; the numbers of linkage k begin at first[k]."""
+    parts: dict[BlockType, list[tuple[int, BlockRows]]] = {}
+    for k, structure in enumerate(structures):
+        for block_type, rows in structure.block_rows.items():
+            parts.setdefault(block_type, []).append((k, rows))
+    for block_type, owned in parts.items():
+        owner = np.repeat([k for k, _ in owned], [len(rows.block_numbers) for _, rows in owned])
+        blocks, links, indices = (np.concatenate(part) for part in zip(*(rows for _, rows in owned), strict=True))
+        numbers = values[indices + first[owner][:, None]]
+        numbers[:, block_type.length_measures] /= unit[owner][:, None]
+        if block_type.angle_measures:
+            angles = numbers[:, block_type.angle_measures]
+            both = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(owner), -1)
+            numbers = np.hstack([numbers, both])
+        yield BlockBatch(block_type, owner, links, numbers, blocks + first_block[owner])
 
 
-def _point_arrays(points: Sequence[list[tuple[float, ...]]], width: int) -> PointArrays:
-    owner = np.repeat(np.arange(len(points)), [len(own) for own in points])
-    flat = np.array([each for own in points for each in own], dtype=float).reshape(-1, 1 + width)
-    return PointArrays(owner, flat[:, 0].astype(np.int64), flat[:, 1:])
-
-
-class SweepRequest(NamedTuple):
-    """What is asked of every mechanism, see `sweep_each`."""
-
-    steps: int
-    points: tuple[str, ...] | None
-    rates: bool
-    pair: str | None
-
-
-class LinkageGroup(NamedTuple):
-    """Linkages that can be solved group after group: their numbers, as arrays, names of their points, where each
-    starts, and the links of all groups. Behind the points of a linkage stand two of each of its `watched` links, which
-    tell where pairs with stops are: the origin of its axes, and the place at the size on the x-axis."""
-
-    numbers: Array
-    arrays: LinkageArrays
-    names: Sequence[Sequence[str]]
-    start: Array
-    links_of_block: Callable[[int], str]
-    mechanisms: Sequence[Mechanism]
-    watched: Sequence[tuple[str, ...]]
-
-
-def linkage_group(mechanisms: Sequence[Mechanism], request: SweepRequest) -> LinkageGroup | None:
-    """Those of the mechanisms that are not for the general path; None where there are none."""
-    ones: list[PartitionedLinkage] = []
-    numbers: list[int] = []
-    names: list[list[str]] = []
-    starts: list[float] = []
-    for k, mechanism in enumerate(mechanisms):
-        made = _partition_linkage(mechanism, request)
-        if made is not None:
-            one, own_names, start = made
-            ones.append(one)
-            numbers.append(k)
-            names.append(own_names)
-            starts.append(start)
-    if not ones:
-        return None
-
-    def block_links(number: int) -> str:
-        for one in ones:
-            if number < len(one.partition.blocks):
-                links = list(one.partition.shapes)
-                return ", ".join(links[k] for k in one.partition.blocks[number].inner_links)
-            number -= len(one.partition.blocks)
-        return ""
-
-    own = [mechanisms[k] for k in numbers]
-    watched, arrays = [watched_links(each) for each in own], make_linkage_arrays(ones)
-    return LinkageGroup(np.array(numbers), arrays, names, np.array(starts), block_links, own, watched)
-
-
-def _partition_linkage(
-    mechanism: Mechanism, request: SweepRequest
-) -> tuple[PartitionedLinkage, list[str], float] | None:
-    """A mechanism parted into groups, with the names of its points and where it starts; None where it is for the
-    general path."""
-    running = running_input_index(mechanism, request.pair, "inputs")
-    try:
-        own = partition_mechanism(mechanism)
-    except (NotPartitionable, BadInput, PointPlacementError):
-        return None
-    kinds = {pair.name: pair.input_kind for pair in mechanism.pairs}
-    angles = [kinds[given.pair] is not Measure.LENGTH for given in mechanism.inputs]
-    if not angles[running] or not all(
-        group.block_type.has_closed_form or group.block_type.has_newton_formulas for group in own.blocks
-    ):
-        return None
-    unit = own.unit
+def _input_arrays(rows: Sequence[_Row], unit: Array) -> InputArrays:
     inputs = [
-        (given.position if angle else given.position / unit, angle, k == running, given.velocity, given.acceleration)
-        for k, (given, angle) in enumerate(zip(mechanism.inputs, angles, strict=True))
+        (owner, 1 + k, given.position, is_angle, k == row.running, given.velocity, given.acceleration)
+        for owner, row in enumerate(rows)
+        for k, (given, is_angle) in enumerate(zip(row.mechanism.inputs, row.structure.input_is_angle, strict=True))
     ]
-    members = _point_members(mechanism, request.points)
-    shown = (
-        [] if all(group.block_type.has_closed_form for group in own.blocks) else _shown_points(mechanism, own, members)
-    )
-    sketch: list[tuple[float, ...]] = []
-    for name, x, y in mechanism.sketch:
-        if name not in members:
-            return None
-        place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
-        if place:
-            at = own.shapes[link].points[point]
-            sketch.append((place, at.x / unit, at.y / unit, x / unit, y / unit))
-    names: list[str] = []
-    points: list[tuple[float, ...]] = []
-    for name in wanted_points(mechanism, members, request.points):
-        place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
-        names.append(name)
-        points.append((place, *own.shapes[link].points[point]))
-    for link in watched_links(mechanism):
-        points += [(own.link_index[link], x, 0.0) for x in (0.0, unit)]
-    return PartitionedLinkage(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
+    arrays = InputArrays(*map(np.array, zip(*inputs, strict=True)))
+    return arrays._replace(value=np.where(arrays.is_angle, arrays.value, arrays.value / unit[arrays.owner]))
 
 
-def _shown_points(
-    mechanism: Mechanism, partition: Partition, members: Mapping[str, Sequence[tuple[str, str]]]
-) -> list[tuple[float, ...]]:
-    """Points of every link that the sketch shows, or that lie on the frame: see `Lot.shown`."""
-    at = {name: (x, y) for name, x, y in mechanism.sketch}
-    found: list[tuple[float, ...]] = []
-    for name, both in members.items():
-        on = next((point for link, point in both if link == mechanism.frame), None)
-        place = at.get(name) if on is None else partition.shapes[mechanism.frame].points[on]
-        if place is not None:
-            for link, point in both:
-                if partition.link_index[link]:
-                    local = partition.shapes[link].points[point]
-                    found.append((partition.link_index[link], *(part / partition.unit for part in (*local, *place))))
-    return found
+def _watched_points(rows: Sequence[_Row], unit: Array) -> PointArrays:
+    points = [
+        (owner, row.structure.link_index[link], x, 0.0)
+        for owner, row in enumerate(rows)
+        for link in watched_links(row.mechanism)
+        for x in (0.0, unit[owner])
+    ]
+    owner, link_index, *numbers = np.array(points, dtype=float).reshape(-1, 4).T
+    return PointArrays(owner.astype(np.int64), link_index.astype(np.int64), np.stack(numbers, axis=1))
 
 
-def _point_members(mechanism: Mechanism, points: tuple[str, ...] | None) -> Mapping[str, Sequence[tuple[str, str]]]:
-    """The (link, point) of named points: of all, or of those that pairs keep together where no other is asked for."""
-    together: dict[str, list[tuple[str, str]]] = {}
-    for pair in mechanism.pairs:
-        own = pair.coincident_points()
-        if own:
-            together.setdefault(pair.entry_name(), []).extend(own)
-    wanted = (*(points or ()), *(name for name, _, _ in mechanism.sketch))
-    if points is not None and all(name in together for name in wanted):
-        return together
-    return {each.name: each.members for each in named_points(mechanism)}
-
-
-def wanted_points(
-    mechanism: Mechanism, members: Mapping[str, Sequence[tuple[str, str]]], points: tuple[str, ...] | None
-) -> list[str]:
-    """The names of the points that are wanted of a mechanism."""
-    if points is not None:
-        return [name for name in points if name in members]
-    return [name for name, own in members.items() if all(link != mechanism.frame for link, _ in own)]
+def watched_links(mechanism: Mechanism) -> tuple[str, ...]:
+    """The moving links whose places decide where the pairs with stops are."""
+    motions = relative_motions(mechanism) if mechanism.stops else {}
+    links = dict.fromkeys(link for stop in mechanism.stops for link in motions[stop.pair].bodies)
+    return tuple(link for link in links if link != mechanism.frame)

@@ -30,9 +30,9 @@ from planar.codegen.tape import (
 from planar.foundation.arrays import Array
 
 PREDICTOR_ORDER = 5
-"""Moves before from which the next is predicted."""
+"""Number of earlier moves from which the next is predicted."""
 CORRECTIONS, FIRST_CORRECTIONS = 2, 10
-"""Steps of Newton's method where the run has come far enough to be predicted, and before."""
+"""Steps of Newton's method where there are enough earlier moves for a prediction, and before."""
 TABLE_COLUMNS = PREDICTOR_ORDER + 2
 
 
@@ -57,7 +57,7 @@ def newton_numbers(block_type: BlockType, p: Array, start: Array) -> Array:
 
 @lru_cache(maxsize=256)
 def compile_newton_block(kind: BlockType, rates: bool) -> Any:
-    """The function of a kind of block, see `planar.codegen.tape`: after its slots there is one of the `step_table`."""
+    """The function of a block type, see `planar.codegen.tape`: after its slots there is one of the `step_table`."""
     return compile_function(_NewtonBlockWriter(kind, rates).write(), BLOCK_NAME, *BLOCK_ARGUMENT_TYPES)
 
 
@@ -99,12 +99,12 @@ class _NewtonBlockWriter:
         t.write_line("br label %newton")
         t.write_label("newton")
         t.write_line("%n = phi i64 [0, %step], [%nnext, %newton]")
-        *back, strength = self._write_formula(self.formulas.step, names)
-        for k, each in enumerate(back):
-            forth = t.add_instruction(f"fneg {t.vector} {each}")
-            self._write_move(k, forth)
-            t.store(t.binary("add", t.load(self.correction_slots[k]), forth), self.correction_slots[k])
-        t.store(strength, self.regularity_slot)
+        *steps, regularity = self._write_formula(self.formulas.step, names)
+        for k, step in enumerate(steps):
+            correction = t.add_instruction(f"fneg {t.vector} {step}")
+            self._write_move(k, correction)
+            t.store(t.binary("add", t.load(self.correction_slots[k]), correction), self.correction_slots[k])
+        t.store(regularity, self.regularity_slot)
         t.close_loop("n", "count", "newton", "solved")
         t.write_label("solved")
         self._write_step_end(names, bases, aheads, self._write_load(row, PREDICTOR_ORDER + 1))
@@ -114,8 +114,8 @@ class _NewtonBlockWriter:
         t.write_label("good")
         t.close_loop("k", "limit", "step", "judged")
         t.write_label("judged")
-        clear, one = (t.load(slot) for slot in self.clear_slots)
-        stays = write_stays_clear(t, clear, one, self.clearance)
+        clear, previous = (t.load(slot) for slot in self.clear_slots)
+        stays = write_stays_clear(t, clear, previous, self.clearance)
         write_stays(t, t.add_instruction(f"extractelement <1 x i1> {stays}, i64 0"))
         t.write_line("br label %done")
         t.write_label("done")
@@ -124,7 +124,7 @@ class _NewtonBlockWriter:
         return t.module_text()
 
     def _write_block_start(self) -> tuple[dict[FormulaInput, str], list[str]]:
-        """A block begins: its numbers, and where its slots are."""
+        """Load the numbers of a block and the addresses of its slots."""
         t, kind = self.ir, self.block_type
         names = {leaf: self._write_load("%p", leaf.place) for leaf in self.operands if leaf.source == "p"}
         bases = []
@@ -145,7 +145,7 @@ class _NewtonBlockWriter:
         return self.ir.row_pointer(base, "%stride", row, "%k")
 
     def _write_step_end(self, names: dict[FormulaInput, str], bases: list[str], aheads: list[str], limit: str) -> None:
-        """The step ends: its results are written and judged, and what it moved, `most` at a time, is remembered."""
+        """Write the results of a step, judge them, and store its moves."""
         t, kind = self.ir, self.block_type
         *outputs, residual = self._write_formula(self.output_formula, names)
         first = kind.slot_count - len(kind.inner_links)
@@ -167,10 +167,10 @@ class _NewtonBlockWriter:
             (part for direction in directions for part in direction[:2]), self.direction_slots, strict=True
         ):
             t.store(value, slot)
-        clear, one, two = (t.load(slot) for slot in (self.regularity_slot, *self.clear_slots))
-        fine = t.and_flags(is_good, write_clear_flags(t, clear, one, two, self.clearance).is_clear)
+        clear, previous, earlier = (t.load(slot) for slot in (self.regularity_slot, *self.clear_slots))
+        fine = t.and_flags(is_good, write_clear_flags(t, clear, previous, earlier, self.clearance).is_clear)
         t.store(clear, self.clear_slots[0])
-        t.store(one, self.clear_slots[1])
+        t.store(previous, self.clear_slots[1])
         t.write_line(f"br i1 {t.add_instruction(f'extractelement <1 x i1> {fine}, i64 0')}, label %good, label %bad")
 
     def _write_load(self, base: str, place: int) -> str:
@@ -178,7 +178,7 @@ class _NewtonBlockWriter:
         return t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer(base, str(place))}"))
 
     def _write_prediction(self, row: str) -> list[str]:
-        """Move the unknowns to where they would be if they went on as before, by a row of the table."""
+        """Move the unknowns by their predicted moves, with the weights in a row of the table."""
         t = self.ir
         weights = [self._write_load(row, k) for k in range(PREDICTOR_ORDER)]
         aheads = []
@@ -190,17 +190,17 @@ class _NewtonBlockWriter:
         return aheads
 
     def _write_move(self, k: int, by: str) -> None:
-        """Move an unknown on: a length by so much, an angle by the rational rotation."""
-        t, (one, two) = self.ir, self.unknown_slots[k]
+        """Add a move to an unknown: to an angle by the rational rotation."""
+        t, (first, second) = self.ir, self.unknown_slots[k]
         if not self.block_type.unknown_is_angle[k]:
-            t.store(t.binary("add", t.load(one), by), one)
+            t.store(t.binary("add", t.load(first), by), first)
             return
         half = t.binary("mul", by, t.constant(0.5))
         square = t.binary("mul", half, half)
         scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
         cos = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale)
         sin = t.binary("mul", by, scale)
-        c, s = t.load(one), t.load(two)
+        c, s = t.load(first), t.load(second)
         c, s = (
             t.binary("sub", t.binary("mul", c, cos), t.binary("mul", s, sin)),
             t.binary("add", t.binary("mul", s, cos), t.binary("mul", c, sin)),
@@ -208,8 +208,8 @@ class _NewtonBlockWriter:
         # back onto the circle, which rounding leaves
         size = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
         scale_back = t.binary("sub", t.constant(1.5), t.binary("mul", t.constant(0.5), size))
-        t.store(t.binary("mul", c, scale_back), one)
-        t.store(t.binary("mul", s, scale_back), two)
+        t.store(t.binary("mul", c, scale_back), first)
+        t.store(t.binary("mul", s, scale_back), second)
 
     def _write_formula(self, formula: BlockFormula, names: dict[FormulaInput, str]) -> list[str]:
         t = self.ir

@@ -1,327 +1,451 @@
-"""A mechanism partitioned into blocks of links that can be solved one after the other."""
+"""The structure of a mechanism: blocks of links that can be solved one after the other, and where their numbers are."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations
-from math import hypot, inf
+from itertools import combinations, count
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.mechanisms.block_type import (
     FRAME_BODY,
-    MAX_BLOCK_TYPES,
     BlockPair,
     BlockSignature,
     BlockType,
     find_block_type,
 )
 from planar.equations.block_decomposition import decompose_blocks
-from planar.foundation.geometry import Vector, frame_at
+from planar.foundation.arrays import IntArray
+from planar.foundation.geometry import frame_at
 from planar.model.link_shapes import At, Link, LinkShape, link_shape
-from planar.model.mechanism import Mechanism, check_mechanism
+from planar.model.mechanism import Mechanism, check_mechanism, named_points
+from planar.model.pairs import MeasureKind as Measure
 from planar.model.pairs import Pair
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 MAX_BLOCK_LINKS = 8
-"""Links of a group: larger ones are left to the general path, which solves the whole."""
-ORIGIN = Vector(0.0, 0.0)
-X_AXIS = Vector(1.0, 0.0)
+"""Maximum number of links of a block: the general path solves mechanisms with larger ones."""
+MAX_STRUCTURES = 1024
+"""Number of structures that are kept."""
 
 
 class NotPartitionable(Exception):
-    """A mechanism that cannot be solved group after group; the text says why."""
+    """A mechanism that cannot be solved block after block; the text says why."""
 
 
 class PartitionBlock(NamedTuple):
-    """One group of a mechanism: its kind, the places of its given links, inputs and inner links, and its numbers p (m).
-
-    `inner_links` are numbers of links; blocks follow those that give them links.
-    """
+    """One block of a mechanism: its type; the places of its given links, inputs and inner links; where the numbers of
+    its pairs are among those of the mechanism; and the names of its inner links."""
 
     block_type: BlockType
     link_indices: tuple[int, ...]
-    p: list[float]
-    inner_links: tuple[int, ...]
+    number_indices: tuple[int, ...]
+    inner_links: tuple[str, ...]
 
 
-class Partition(NamedTuple):
-    """A mechanism as data, its lengths in units of `unit` (m).
+class BlockRows(NamedTuple):
+    """The blocks of one type in a structure: `block_numbers` (blocks,), and arrays (blocks, ...) of what a
+    `PartitionBlock` has."""
 
-    Places: 0 is the frame, then every input, then the links as they are solved; `link_index` tells those of the links.
+    block_numbers: IntArray
+    link_indices: IntArray
+    number_indices: IntArray
+
+
+class PointLayout(NamedTuple):
+    """Points of a structure (points,): the places of their links; and where x in the link and x in the world are among
+    the numbers, before y."""
+
+    link_index: IntArray
+    coordinates: IntArray
+    places: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What mechanisms have in common whose names, pair types, inputs and names in the sketch are equal.
+
+    Places: 0 is the frame, then every input, then the links in the order in which they are solved; `link_index` maps
+    the names of links to places. Blocks follow those that give them links.
+
+    The numbers of a mechanism are x and y of all points in their links (m), link after link; then the numbers of those
+    pairs that are not pins, `measured_pairs` (pair, first link, second link); then x and y of its sketch.
+    `point_places` (points,) are the places of the points' links, `link_starts` the first point of each link that has
+    points, `arms` (arms, 2) the pairs of points whose distance decides the angle of a link in its block. `members`: the
+    points that lie together under a name, that on the link with the lowest place first. `sketch`: points of the sketch
+    that move. `shown_points`: points of every link that the sketch shows, or that lie on the frame, if a block has no
+    closed form.
     """
 
-    mechanism: Mechanism
-    shapes: dict[str, LinkShape]
-    unit: float
-    tolerance: float
-    blocks: list[PartitionBlock]
     link_index: dict[str, int]
-    index_count: int
+    place_count: int
+    blocks: list[PartitionBlock]
+    block_rows: dict[BlockType, BlockRows]
+    input_is_angle: list[bool]
+    measured_pairs: list[tuple[int, int, int]]
+    point_places: IntArray
+    link_starts: IntArray
+    arms: IntArray
+    members: dict[str, list[int]]
+    moving_points: tuple[str, ...]
+    sketch: PointLayout
+    shown_points: PointLayout
 
 
-class _PairTypeFacts(NamedTuple):
-    """The number of a pair type among all, how many motions it prevents, and whether it says the same of its bodies
-    the other way round, so that kinds need not tell the two apart."""
-
-    number: int
-    holds: int
-    is_symmetric: bool
+_PairKey = tuple[type[Pair], str, tuple[str, str], str, tuple[tuple[str, str], ...]]
+"""Of a pair its type, its name, its links, the name of its entry, and the points that it keeps together."""
+_structures: dict[object, Structure] = {}
 
 
-@lru_cache
-def _pair_type_facts(pair_type: type[Pair]) -> _PairTypeFacts | None:
-    """What there is to know of a pair type; None for one that needs the whole."""
-    whole = (
-        pair_type.counts_turns or pair_type.contact_gap is not Pair.contact_gap or pair_type.bodies is not Pair.bodies
-    )
-    if whole or pair_type.find_misfit is not Pair.find_misfit:
-        return None
-    return _PairTypeFacts(_pair_type_number(pair_type), pair_type.prevented_motion_count(), _is_symmetric(pair_type))
+def partition_mechanism(mechanism: Mechanism) -> tuple[Structure, list[float]]:
+    """The structure of a mechanism, and its numbers (m, rad).
 
-
-def _is_symmetric(pair_type: type[Pair]) -> bool:
-    """Whether the residual only changes its sign where the bodies and their halves of the numbers change places."""
-    half = len(pair_type.number_kinds) // 2
-    if (
-        pair_type.coordinate_kinds
-        or 2 * half != len(pair_type.number_kinds)
-        or pair_type.number_kinds[:half] != pair_type.number_kinds[half:]
-    ):
-        return False
-    rng = np.random.default_rng(0)
-    a, b = (frame_at(*rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
-    numbers, pair = list(rng.uniform(-1.0, 1.0, 2 * half)), pair_type.samples()[0].pair
-    one = np.array(pair.residual((a, b), numbers, ()))
-    return bool(np.allclose(one, -np.array(pair.residual((b, a), numbers[half:] + numbers[:half], ())), atol=1e-12))
-
-
-_PAIR_TYPE_NUMBERS: dict[type[Pair], int] = {}
-
-
-def _pair_type_number(pair_type: type[Pair]) -> int:
-    return _PAIR_TYPE_NUMBERS.setdefault(pair_type, len(_PAIR_TYPE_NUMBERS))
-
-
-def quick_link_shape(link: Link) -> LinkShape:
-    """The shape of a link."""
-    points = link.points
-    if link.axis is not None:
-        return link_shape(link)
-    drawn: dict[str, Vector] = {}
-    for name, place in points:
-        if type(place) is not At:
-            return link_shape(link)
-        drawn[name] = Vector(place.x, place.y)
-    if link.ends is not None:
-        drawn = {link.ends[0]: ORIGIN, link.ends[1]: Vector(link.length, 0.0)} | drawn
-    return LinkShape(drawn, ORIGIN, X_AXIS)
-
-
-def partition_mechanism(mechanism: Mechanism) -> Partition:
-    """The groups of a mechanism. Raises NotPartitionable where it needs the whole, BadInput and PointPlacementError
-    where it is none."""
+    Raises NotPartitionable where it can only be solved as a whole, BadInput and PointPlacementError for wrong
+    arguments.
+    """
     try:
-        return _Partitioner(mechanism).partition()
+        return _partition(mechanism)
     except (KeyError, AttributeError):
         check_mechanism(mechanism)
         raise NotPartitionable("something in it is not as its pairs expect it") from None
 
 
+def _partition(mechanism: Mechanism) -> tuple[Structure, list[float]]:
+    numbers: list[float] = []
+    shapes: dict[str, LinkShape] = {}
+    point_names = [_read_points(link, numbers, shapes) for link in mechanism.links]
+    pairs = [(type(p), p.name, p.links, p.entry_name(), p.coincident_points()) for p in mechanism.pairs]
+    links, inputs = [link.name for link in mechanism.links], [given.pair for given in mechanism.inputs]
+    sketch = [name for name, _, _ in mechanism.sketch]
+    key = mechanism.frame, tuple(links), tuple(point_names), tuple(pairs), tuple(inputs), tuple(sketch)
+    structure = _structures.get(key)
+    if structure is None:
+        if len(_structures) >= MAX_STRUCTURES:
+            _structures.clear()
+        structure = _structures[key] = _Partitioner(mechanism, point_names, pairs).partition()
+    for k, *ends in structure.measured_pairs:
+        for link in ends:
+            if links[link] not in shapes:
+                shapes[links[link]] = link_shape(mechanism.links[link])
+        numbers += mechanism.pairs[k].measure([shapes[links[link]] for link in ends])
+    for _, x, y in mechanism.sketch:
+        numbers += (x, y)
+    return structure, numbers
+
+
+def _read_points(link: Link, numbers: list[float], shapes: dict[str, LinkShape]) -> tuple[str, ...]:
+    """The names of the points of a link; x and y of each are added to the numbers, and the shape of a link to
+    the shapes that has to be worked out."""
+    names, first = link.ends or (), len(numbers)
+    if names:
+        numbers += (0.0, 0.0, link.length, 0.0)  # type: ignore[arg-type]
+    for name, place in link.points:
+        if type(place) is not At or name in names or link.axis is not None:
+            shape = shapes[link.name] = link_shape(link)
+            numbers[first:] = [part for point in shape.points.values() for part in point]
+            return tuple(shape.points)
+        numbers += place
+        names = (*names, name)
+    return names
+
+
+class _PairTypeFacts(NamedTuple):
+    """The number of a pair type among all, how many motions it prevents, and whether it is a pin: its numbers are
+    the coordinates of the points that it keeps together, and it is the same with the links exchanged."""
+
+    number: int
+    prevented_motions: int
+    is_pin: bool
+
+
+_pair_type_numbers = count()
+
+
+@lru_cache
+def _pair_type_facts(pair_type: type[Pair]) -> _PairTypeFacts | None:
+    """The facts of a pair type; None for one that needs more than the places of its two links."""
+    if pair_type.counts_turns or any(
+        getattr(pair_type, name) is not getattr(Pair, name) for name in ("contact_gap", "bodies", "find_misfit")
+    ):
+        return None
+    is_pin = False
+    sample = pair_type.samples()[0]
+    points = sample.pair.coincident_points()
+    if len(points) == 2 and pair_type.number_kinds == (Measure.LENGTH,) * 4 and not pair_type.coordinate_kinds:
+        rng = np.random.default_rng(0)
+        numbers, frames = rng.uniform(-1.0, 1.0, 4).tolist(), [frame_at(*rng.uniform(-1.0, 1.0, 3)) for _ in range(2)]
+        residual = np.array(sample.pair.residual(frames, numbers, ()))
+        exchanged = sample.pair.residual(frames[::-1], numbers[2:] + numbers[:2], ())
+        places = [part for shape, (_, point) in zip(sample.shapes, points, strict=True) for part in shape.points[point]]
+        is_pin = bool(np.allclose(residual, np.negative(exchanged), atol=1e-12))
+        is_pin &= list(sample.pair.measure(sample.shapes)) == places
+    return _PairTypeFacts(next(_pair_type_numbers), pair_type.prevented_motion_count(), is_pin)
+
+
 class _Partitioner:
-    def __init__(self, mechanism: Mechanism):
-        self.mechanism = mechanism
-        self.shapes = {link.name: quick_link_shape(link) for link in mechanism.links}
-        self.unit, self.reach = _size_and_reach(self.shapes.values())
-        number = {name: k for k, name in enumerate(self.shapes)}
-        self.names = list(number)
-        self.frame = number[mechanism.frame]
-        many = len(number)
-        self.neighbours: list[list[tuple[int, int]]] = [[] for _ in range(many)]
-        "for every link the links beside it, each with the pair between"
-        self.pairs = list(mechanism.pairs)
-        self.pair_points = [pair.coincident_points() for pair in self.pairs]
-        self.prevented_motions: list[int] = []
+    """Finds the structure of a mechanism."""
+
+    def __init__(self, mechanism: Mechanism, point_names: Sequence[tuple[str, ...]], pairs: Sequence[_PairKey]):
+        self.mechanism, self.pairs = mechanism, pairs
+        self.names = [link.name for link in mechanism.links]
+        self.frame = self.names.index(mechanism.frame)
+        points = [(link, name) for link, names in zip(self.names, point_names, strict=True) for name in names]
+        self.points = {point: k for k, point in enumerate(points)}
+        self.point_links = [link for link, names in enumerate(point_names) for _ in names]
+        self.number_count = 2 * len(points)
+        self.measured_pairs: list[tuple[int, int, int]] = []
         self.ends: list[tuple[int, int]] = []
+        "the links of every pair"
+        self.pair_numbers: list[tuple[int, ...]] = []
+        "where the numbers of every pair are"
+        self.facts: list[_PairTypeFacts] = []
         self.is_symmetric: list[bool] = []
-        for k, pair in enumerate(self.pairs):
-            about = _pair_type_facts(type(pair))
-            if about is None:
-                raise NotPartitionable(f"{pair.name} ties more together than two links at one place")
-            a, b = pair.links
-            first, second = number[a], number[b]
-            self.neighbours[first].append((second, k))
-            self.neighbours[second].append((first, k))
-            self.prevented_motions.append(about.holds)
-            self.is_symmetric.append(about.is_symmetric)
-            self.ends.append((first, second))
+        self.neighbours: list[list[tuple[int, int]]] = [[] for _ in self.names]
+        "for every link the links beside it, each with the pair between"
+        self._add_pairs()
         self.input_of_pair: dict[int, int] = {}
+        self.prevented_motions = [facts.prevented_motions for facts in self.facts]
+        pair_indices = {pairs[k][1]: k for k in reversed(range(len(pairs)))}
         for k, given in enumerate(mechanism.inputs):
-            place = next((i for i, pair in enumerate(self.pairs) if pair.name == given.pair), None)
-            if place is None or place in self.input_of_pair:
+            index = pair_indices.get(given.pair)
+            if index is None or index in self.input_of_pair:
                 raise NotPartitionable(f"the input at {given.pair} is between links that no pair of their own joins")
-            self.input_of_pair[place] = k
-            self.is_symmetric[place] = False  # an input is of the second body against the first
-            self.prevented_motions[place] += 1
-        self.number = number
+            self.input_of_pair[index] = k
+            self.is_symmetric[index] = False  # an input is of the second body against the first
+            self.prevented_motions[index] += 1
         self.shared_pins = self._find_shared_pins()
-        self.link_index = [-1] * many
+        self.link_index = [-1] * len(self.names)
         self.link_index[self.frame] = 0
         self.blocks: list[PartitionBlock] = []
-        self.index_count = 1 + len(mechanism.inputs)
+        self.arms: list[tuple[int, int]] = []
+        self.place_count = 1 + len(mechanism.inputs)
 
-    def partition(self) -> Partition:
-        """See `partition_mechanism`."""
+    def _add_pairs(self) -> None:
+        number = {name: k for k, name in enumerate(self.names)}
+        numbers: tuple[int, ...]
+        for k, (pair_type, name, links, _, points) in enumerate(self.pairs):
+            facts = _pair_type_facts(pair_type)
+            if facts is None:
+                raise NotPartitionable(f"{name} ties more together than two links at one place")
+            ends = number[links[0]], number[links[1]]
+            if facts.is_pin:
+                first, second = 2 * self.points[points[0]], 2 * self.points[points[1]]
+                numbers = first, first + 1, second, second + 1
+            else:
+                self.measured_pairs.append((k, *ends))
+                numbers = tuple(range(self.number_count, self.number_count + len(pair_type.number_kinds)))
+                self.number_count += len(numbers)
+            self.facts.append(facts)
+            self.is_symmetric.append(facts.is_pin)
+            self.pair_numbers.append(numbers)
+            self.ends.append(ends)
+            self._join(k)
+
+    def _join(self, k: int) -> None:
+        first, second = self.ends[k]
+        self.neighbours[first].append((second, k))
+        self.neighbours[second].append((first, k))
+
+    def partition(self) -> Structure:
+        """See `Structure`."""
         self._add_links_and_dyads()
         if len(self.blocks) == 0 or -1 in self.link_index:
             self._add_remaining_blocks()
-        tolerance = float(residual_tolerance(len(self.names), self.reach / self.unit))
-        places = dict(zip(self.names, self.link_index, strict=True))
-        return Partition(self.mechanism, self.shapes, self.unit, tolerance, self.blocks, places, self.index_count)
+        rows: dict[BlockType, list[int]] = {}
+        for k, block in enumerate(self.blocks):
+            rows.setdefault(block.block_type, []).append(k)
+        if not all(block_type.has_closed_form or block_type.has_newton_formulas for block_type in rows):
+            raise NotPartitionable("formulas are too long to be compiled")
+        block_rows = {
+            block_type: BlockRows(
+                np.array(own),
+                *(np.array([self.blocks[k][part] for k in own], dtype=np.int64) for part in (1, 2)),
+            )
+            for block_type, own in rows.items()
+        }
+        kinds = {name: pair_type.input_kind for pair_type, name, *_ in self.pairs}
+        point_places = [self.link_index[link] for link in self.point_links]
+        members = {name: [self.points[point] for point in points] for name, points in named_points(self.mechanism)}
+        for points in members.values():
+            points.sort(key=point_places.__getitem__)
+        starts = [k for k, link in enumerate(self.point_links) if k == 0 or link != self.point_links[k - 1]]
+        sketch, shown = self._sketch_layouts(members, point_places, all(kind.has_closed_form for kind in rows))
+        return Structure(
+            dict(zip(self.names, self.link_index, strict=True)),
+            self.place_count,
+            self.blocks,
+            block_rows,
+            [kinds[given.pair] is not Measure.LENGTH for given in self.mechanism.inputs],
+            self.measured_pairs,
+            np.array(point_places, dtype=np.int64),
+            np.array(starts, dtype=np.int64),
+            np.array(self.arms, dtype=np.int64).reshape(-1, 2),
+            members,
+            tuple(name for name, points in members.items() if point_places[points[0]]),
+            sketch,
+            shown,
+        )
+
+    def _sketch_layouts(
+        self, members: dict[str, list[int]], point_places: Sequence[int], has_closed_form: bool
+    ) -> tuple[PointLayout, PointLayout]:
+        """`sketch` and `shown_points` of the structure."""
+        names = [name for name, _, _ in self.mechanism.sketch]
+        if not all(name in members for name in names):
+            raise NotPartitionable("the sketch names a point that is not there")
+        in_sketch = {name: self.number_count + 2 * k for k, name in enumerate(names)}
+        sketch = [(members[name][0], self.number_count + 2 * k) for k, name in enumerate(names)]
+        shown: list[tuple[int, int]] = []
+        for name, points in members.items() if not has_closed_form else ():
+            place = in_sketch.get(name) if point_places[points[0]] else 2 * points[0]
+            if place is not None:
+                shown += [(point, place) for point in points]
+        layouts = []
+        for rows in (sketch, shown):
+            moving = [(point_places[k], 2 * k, place) for k, place in rows if point_places[k]]
+            layouts.append(PointLayout(*np.array(moving, dtype=np.int64).reshape(-1, 3).T))
+        return layouts[0], layouts[1]
 
     def _find_shared_pins(self) -> dict[int, list[list[int]]]:
-        """Of every link the pins that it shares with two links or more, each as its pairs, all from one link."""
+        """For every link the pins that it shares with two links or more, each as its pairs, all from one link."""
         pins: dict[str, list[int]] = {}
-        for k, pair in enumerate(self.pairs):
+        for k, (_, _, _, entry, _) in enumerate(self.pairs):
             if self.is_symmetric[k]:
-                pins.setdefault(pair.entry_name(), []).append(k)
-        found: dict[int, list[list[int]]] = {}
-        for own in pins.values():
-            if len(own) > 1:
-                for link in {link for k in own for link in self.ends[k]}:
-                    found.setdefault(link, []).append(own)
-        return found
+                pins.setdefault(entry, []).append(k)
+        shared: dict[int, list[list[int]]] = {}
+        for pairs in pins.values():
+            if len(pairs) > 1:
+                for link in {link for k in pairs for link in self.ends[k]}:
+                    shared.setdefault(link, []).append(pairs)
+        return shared
 
-    def _rebase_pin(self, own: list[int], link: int) -> None:
-        """Let the pairs of a pin start from another of its links."""
-        if all(link in self.ends[k] for k in own):
+    def _base_links(self, pairs: list[int]) -> set[int]:
+        """The link from which the pairs of a shared pin start."""
+        return set(self.ends[pairs[0]]) & set(self.ends[pairs[1]])
+
+    def _rebase_pin(self, pairs: list[int], link: int) -> None:
+        """Let the pairs of a shared pin start from another of its links."""
+        if all(link in self.ends[k] for k in pairs):
             return
-        pairs = [self.pairs[k] for k in own]
-        named = self.names[link]
-        for k in own:
-            first, second = self.ends[k]
-            self.neighbours[first].remove((second, k))
-            self.neighbours[second].remove((first, k))
-        others = [pair for pair in type(pairs[0]).relative_motions(pairs) if named in pair.links]
-        for k, pair in zip(own, others, strict=True):
-            self.pairs[k], self.pair_points[k] = pair, pair.coincident_points()
-            one, other = pair.links
-            first, second = self.ends[k] = self.number[one], self.number[other]
-            self.neighbours[first].append((second, k))
-            self.neighbours[second].append((first, k))
+        numbers = {}
+        for k in pairs:
+            for end, part in zip(self.ends[k], (slice(2), slice(2, 4)), strict=True):
+                numbers[end] = self.pair_numbers[k][part]
+            for end, other in (self.ends[k], self.ends[k][::-1]):
+                self.neighbours[end].remove((other, k))
+        links = list(numbers)
+        ends = [pair for pair in combinations(links, 2) if link in pair]
+        for k, (first, second) in zip(pairs, ends, strict=True):
+            self.ends[k], self.pair_numbers[k] = (first, second), numbers[first] + numbers[second]
+            self._join(k)
 
     def _add_links_and_dyads(self) -> None:
-        """Links that follow at once from known ones: one alone, or two together."""
-        held = [0] * len(self.link_index)
+        """Add the links that follow at once from known ones: one alone, or two together."""
+        prevented = [0] * len(self.link_index)
         waiting = [self.frame]
         while waiting:
-            self._add_following_links(waiting, held)
-            # two that share a pin with a third, which is not known, and hang by one end each
-            for own in {id(own): own for pins in self.shared_pins.values() for own in pins}.values():
-                links = dict.fromkeys(link for k in own for link in self.ends[k])
-                ends = [link for link in links if self.link_index[link] < 0 and held[link] == 2]
+            self._add_following_links(waiting, prevented)
+            # two that share a pin with a third, which is not known, and are each joined to one known link
+            for pairs in {id(pairs): pairs for pins in self.shared_pins.values() for pairs in pins}.values():
+                links = dict.fromkeys(link for k in pairs for link in self.ends[k])
+                ends = [link for link in links if self.link_index[link] < 0 and prevented[link] == 2]
                 if len(ends) == 2 and all(self.link_index[link] < 0 for link in links):
-                    self._rebase_pin(own, ends[0])
+                    self._rebase_pin(pairs, ends[0])
                     self._add_block(tuple(ends))
                     waiting += ends
                     break
 
-    def _add_following_links(self, waiting: list[int], held: list[int]) -> None:
-        """Add what follows at once from links that wait to be looked at; `held`: motions that known links prevent."""
-        place, beside, weights = self.link_index, self.neighbours, self.prevented_motions
+    def _add_following_links(self, waiting: list[int], prevented: list[int]) -> None:
+        """Add what follows at once from links that wait; `prevented`: how many motions known links prevent."""
+        place, neighbours, weights = self.link_index, self.neighbours, self.prevented_motions
         while waiting:
             new = waiting.pop()
-            for own in self.shared_pins.get(new, ()):
-                if not any(place[link] >= 0 for link in self._base_links(own)):
-                    self._rebase_pin(own, new)
+            for pairs in self.shared_pins.get(new, ()):
+                if not any(place[link] >= 0 for link in self._base_links(pairs)):
+                    self._rebase_pin(pairs, new)
             touched = []
-            for link, k in beside[new]:
+            for link, k in neighbours[new]:
                 if place[link] < 0:
-                    held[link] += weights[k]
+                    prevented[link] += weights[k]
                     touched.append(link)
             for link in touched:
                 if place[link] < 0:
-                    waiting += self._add_block_with(link, held)
+                    waiting += self._add_block_with(link, prevented)
 
-    def _add_block_with(self, link: int, held: list[int]) -> tuple[int, ...]:
-        """The links of a group that a link is in, by itself or with another, if it follows from known ones: added."""
-        if held[link] == 3:
+    def _add_block_with(self, link: int, prevented: list[int]) -> tuple[int, ...]:
+        """Add the block of a link, alone or with another, if it follows from known links; return its links."""
+        if prevented[link] == 3:
             self._add_block((link,))
             return (link,)
-        if held[link] > 3:
+        if prevented[link] > 3:
             raise NotPartitionable(f"link {self.names[link]} is held more than once")
         between: dict[int, int] = {}
         for other, k in self.neighbours[link]:
             if self.link_index[other] < 0:
                 between[other] = between.get(other, 0) + self.prevented_motions[k]
-        for other, holds in between.items():
-            whole = held[link] + held[other] + holds
-            if whole == 6 and held[other] <= 3:
+        for other, motions in between.items():
+            total = prevented[link] + prevented[other] + motions
+            if total == 6 and prevented[other] <= 3:
                 self._add_block((link, other))
                 return (link, other)
-            if whole > 6:
+            if total > 6:
                 raise NotPartitionable(f"links {self.names[link]} and {self.names[other]} are held more than once")
         return ()
 
-    def _base_links(self, own: list[int]) -> set[int]:
-        """The link from which the pairs of a pin start."""
-        return set(self.ends[own[0]]) & set(self.ends[own[1]])
-
     def _add_remaining_blocks(self) -> None:
-        """What is left, in the smallest groups: Dulmage and Mendelsohn on links, each of three columns."""
-        left = [link for link, place in enumerate(self.link_index) if place < 0]
-        number = {link: k for k, link in enumerate(left)}
+        """Add the other links in the smallest blocks: Dulmage and Mendelsohn on links, each of three columns."""
+        links = [link for link, place in enumerate(self.link_index) if place < 0]
+        number = {link: k for k, link in enumerate(links)}
         rows: list[frozenset[int]] = []
-        for (a, b), weight in zip(self.ends, self.prevented_motions, strict=True):
-            own = [number[link] for link in (a, b) if link in number]
-            if own:
-                rows += [frozenset(3 * k + part for k in own for part in range(3))] * weight
-        if len(rows) != 3 * len(left):
+        for ends, weight in zip(self.ends, self.prevented_motions, strict=True):
+            unknown = [number[link] for link in ends if link in number]
+            if unknown:
+                rows += [frozenset(3 * k + part for k in unknown for part in range(3))] * weight
+        if len(rows) != 3 * len(links):
             raise NotPartitionable("pairs and inputs leave links free, or hold them more than once")
-        for group in decompose_blocks(rows, 3 * len(left)):
-            if group.is_free or len(group.rows) != len(group.columns):
+        for block in decompose_blocks(rows, 3 * len(links)):
+            if block.is_free or len(block.rows) != len(block.columns):
                 raise NotPartitionable("pairs and inputs leave links free, or hold them more than once")
-            links = tuple(sorted({left[column // 3] for column in group.columns}))
-            if len(links) > MAX_BLOCK_LINKS:
-                raise NotPartitionable(f"{len(links)} links are solved together")
-            self._add_block(links)
+            inner = tuple(sorted({links[column // 3] for column in block.columns}))
+            if len(inner) > MAX_BLOCK_LINKS:
+                raise NotPartitionable(f"{len(inner)} links are solved together")
+            self._add_block(inner)
 
-    def _refuse_short_arms(self, inner: tuple[int, ...], pairs: Sequence[int]) -> None:
-        """Links whose arm between the pairs that place them is so short that rounding takes digits of their angles.
+    def _add_arms(self, inner: tuple[int, ...], pairs: Sequence[int]) -> None:
+        """Note the arms between the pins that place inner links.
 
-        What the input turns is turned exactly, and the pairs of later groups ask for places alone.
+        An input turns its link exactly, and the pairs of later blocks need places only.
         """
         if len(inner) == 1 and any(k in self.input_of_pair for k in pairs):
             return
-        for link in inner:
-            name = self.names[link]
-            shape = self.shapes[name].points
-            places = [shape[at] for at in {at for k in pairs for owner, at in self.pair_points[k] if owner == name}]
-            arms = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(places, 2))
-            if min(filter(None, arms), default=inf) < SHORT_ARM * self.unit:
-                raise NotPartitionable(f"link {name} is so short that rounding takes digits")
+        points: dict[int, set[int]] = {link: set() for link in inner}
+        for k in pairs:
+            for link, number in zip(self.ends[k], self.pair_numbers[k][::2], strict=False):
+                if self.facts[k].is_pin and link in points:
+                    points[link].add(number // 2)
+        self.arms += [arm for own in points.values() for arm in combinations(own, 2)]
 
     def _add_block(self, inner: tuple[int, ...]) -> None:
-        """Add a group: its pairs in an order that does not depend on names."""
-        place, pairs, driven = self.link_index, self.pairs, self.input_of_pair
+        """Add a block, its pairs in an order that does not depend on names."""
+        place, driven = self.link_index, self.input_of_pair
         if len(inner) > 1:
             inner = tuple(sorted(inner, key=self._sort_key))
         local = {link: k for k, link in enumerate(inner)}
-        found = []
-        for link in inner:
+        rows = []
+        for here, link in enumerate(inner):
             for other, k in self.neighbours[link]:
-                here, there = local[link], local.get(other, -1)
-                if (place[other] >= 0) or there > here:
-                    turned = self.is_symmetric[k] or self.ends[k][0] == link
-                    found.append((_PAIR_TYPE_NUMBERS[type(pairs[k])], here, there, turned, k in driven, k, other))
-        found.sort()
+                there = local.get(other, -1)
+                if place[other] >= 0 or there > here:
+                    is_first = self.is_symmetric[k] or self.ends[k][0] == link
+                    rows.append((self.facts[k].number, here, there, is_first, k in driven, k, other))
+        rows.sort()
         given: list[int] = []
-        p: list[float] = []
-        key, inputs = [], []
-        shapes, names = self.shapes, self.names
-        for number, here, inside, turned, is_driven, k, other in found:
+        numbers: list[int] = []
+        pairs: list[BlockPair] = []
+        inputs: list[int] = []
+        for _, here, inside, is_first, is_driven, k, other in rows:
             there = inside
             if inside < 0:
                 there = FRAME_BODY if is_driven and other == self.frame else -1 - len(given)
@@ -329,65 +453,26 @@ class _Partitioner:
                     given.append(place[other])
             if is_driven:
                 inputs.append(1 + driven[k])
-            key.append((number, (here, there) if turned else (there, here), is_driven))
-            pair = pairs[k]
-            first, second = self.ends[k]
-            numbers = pair.measure((shapes[names[first]], shapes[names[second]]))
-            if self.is_symmetric[k] and first != inner[here]:
-                half = len(numbers) // 2
-                numbers = (*numbers[half:], *numbers[:half])
-            p += numbers
-        self._refuse_short_arms(inner, [each[-2] for each in found])
-        known = (len(inner), len(given), tuple(key))
-        own = _BLOCK_TYPES.get(known) or _make_block_type(known, [type(pairs[each[5]]) for each in found])
-        if not own.is_square:
+            pairs.append(BlockPair(self.pairs[k][0], (here, there) if is_first else (there, here), is_driven))
+            is_exchanged = self.is_symmetric[k] and self.ends[k][0] != inner[here]
+            own = self.pair_numbers[k]
+            numbers += own[2:] + own[:2] if is_exchanged else own
+        self._add_arms(inner, [row[-2] for row in rows])
+        block_type = find_block_type(BlockSignature(len(inner), len(given), tuple(pairs)))
+        if not block_type.is_square:
             raise NotPartitionable("constraints hold each other more than once")
-        own_places = []
-        for link in inner:
-            place[link] = self.index_count
-            own_places.append(self.index_count)
-            self.index_count += 1
-        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner))
+        inner_places = range(self.place_count, self.place_count + len(inner))
+        for link, index in zip(inner, inner_places, strict=True):
+            place[link] = index
+        self.place_count += len(inner)
+        names = tuple(self.names[link] for link in inner)
+        self.blocks.append(PartitionBlock(block_type, (*given, *inputs, *inner_places), tuple(numbers), names))
 
-    def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool, bool]]]:
-        """What a link of a group is held by, so that equal groups come out alike."""
-        own = [
-            (
-                _PAIR_TYPE_NUMBERS[type(self.pairs[k])],
-                self.is_symmetric[k] or self.ends[k][0] == link,
-                k in self.input_of_pair,
-                self.link_index[other] < 0,
-            )
+    def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool]]]:
+        """The pairs between a link of a block and known links, so that equal blocks get the same order."""
+        pairs = [
+            (self.facts[k].number, self.is_symmetric[k] or self.ends[k][0] == link, k in self.input_of_pair)
             for other, k in self.neighbours[link]
             if self.link_index[other] >= 0
         ]
-        return len(own), sorted(own)
-
-
-_SignatureKey = tuple[int, int, tuple[tuple[int, tuple[int, int], bool], ...]]
-_BLOCK_TYPES: dict[_SignatureKey, BlockType] = {}
-
-
-def _make_block_type(signature_key: _SignatureKey, pair_types: Sequence[type[Pair]]) -> BlockType:
-    inner, given, key = signature_key
-    joints = tuple(BlockPair(each, bodies, driven) for each, (_, bodies, driven) in zip(pair_types, key, strict=True))
-    if len(_BLOCK_TYPES) >= MAX_BLOCK_TYPES:
-        _BLOCK_TYPES.clear()
-    made = _BLOCK_TYPES[signature_key] = find_block_type(BlockSignature(inner, given, joints))
-    return made
-
-
-def _size_and_reach(shapes: Iterable[LinkShape]) -> tuple[float, float]:
-    """The greatest extent of a link, and the greatest coordinate (m)."""
-    greatest, reach = 0.0, 0.0
-    for each in shapes:
-        points = each.points
-        if len(points) == 2:
-            (ax, ay), (bx, by) = points.values()
-            greatest = max(greatest, hypot(bx - ax, by - ay))
-            reach = max(reach, abs(ax), abs(ay), abs(bx), abs(by))
-        elif points:
-            xs, ys = zip(*points.values(), strict=True)
-            greatest = max(greatest, hypot(max(xs) - min(xs), max(ys) - min(ys)))
-            reach = max(reach, *map(abs, xs), *map(abs, ys))
-    return greatest or 1.0, reach
+        return len(pairs), sorted(pairs)

@@ -1,4 +1,4 @@
-"""Mechanisms of any kind some at a time: read, checked, and what there is to say of all."""
+"""The mechanisms of a sweep, read and checked part by part, and the messages about them."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ from planar.model.wording import count_phrase
 T = TypeVar("T")
 
 PART_SIZE = 512
-"""Mechanisms that are assembled together, and handed to a thread or an executor."""
+"""Number of mechanisms that a thread or an executor solves together."""
 
 
 class PartRuns(NamedTuple):
-    """Where parts are solved, the type that their numbers have, and who is told how far they are."""
+    """Where parts are solved, the type of their numbers, and the function that is called with the progress."""
 
     threads: int
     executor: Executor | None
     dtype: str
     progress: Callable[[int, int], object] | None
 
-    def tell(self, done: int, many: int) -> None:
-        """So many of so many are done."""
-        report_progress(done, many)
+    def report(self, done: int, count: int) -> None:
+        """Report how many of how many mechanisms are done."""
+        report_progress(done, count)
         if self.progress is not None:
-            self.progress(done, many)
+            self.progress(done, count)
 
 
 def iterate_sources(sources: Iterable[T]) -> Iterator[T]:
-    """One after the other. Raises BadInput where it is no list, or the like."""
+    """Iterate over mechanisms. Raises BadInput if they are no list, or the like."""
     if isinstance(sources, str | PathLike | Mechanism) or not isinstance(sources, Iterable):
         raise BadInput("mechanisms", f"a list of mechanisms is wanted, not {type(sources).__name__} {sources!r:.40}")
     return iter(sources)
 
 
 def read_mechanisms(sources: Iterable[MechanismSource | PinnedLinkages], first: int = 0) -> list[Mechanism]:
-    """The mechanisms, the `first` by its number, each file or model read once. Raises BadInput."""
+    """Read mechanisms, each file or model once; `first` is the number of the first one. Raises BadInput."""
     read: dict[str | PathLike[str], Mechanism] = {}
     mechanisms = []
     for source in iterate_sources(sources):
@@ -65,7 +65,7 @@ def read_mechanisms(sources: Iterable[MechanismSource | PinnedLinkages], first: 
 
 
 def check_inputs(mechanisms: Sequence[Mechanism], pair: str | None, first: int = 0) -> None:
-    """Raises BadInput for a mechanism without an input that runs, `first` by its number."""
+    """Raise BadInput for a mechanism without an input that runs; `first` is the number of the first one."""
     for k, mechanism in enumerate(mechanisms, first):
         if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
             running_input_index(mechanism, pair, f"mechanisms[{k}]")
@@ -74,7 +74,7 @@ def check_inputs(mechanisms: Sequence[Mechanism], pair: str | None, first: int =
 def stream_parts(
     sources: Iterable[MechanismSource | PinnedLinkages], pair: str | None
 ) -> Iterator[list[Mechanism] | PinnedLinkages]:
-    """Mechanisms some at a time, read when they are asked for."""
+    """Yield mechanisms part by part, read when they are needed."""
     if isinstance(sources, PinnedLinkages):
         sources = [sources]
     done, waiting = 0, list[Mechanism]()
@@ -85,9 +85,9 @@ def stream_parts(
             yield from (source[k : k + PART_SIZE] for k in range(0, len(source), PART_SIZE))
             done, waiting = done + len(waiting) + len(source), []
             continue
-        own = read_mechanisms(source if isinstance(source, PinnedLinkages) else [source], done + len(waiting))
-        check_inputs(own, pair, done + len(waiting))
-        waiting += own
+        read = read_mechanisms(source if isinstance(source, PinnedLinkages) else [source], done + len(waiting))
+        check_inputs(read, pair, done + len(waiting))
+        waiting += read
         if len(waiting) >= PART_SIZE:
             yield waiting
             done, waiting = done + len(waiting), []
@@ -96,14 +96,14 @@ def stream_parts(
 
 
 def find_endings(part: SweptPart) -> tuple[tuple[int, int, str], ...]:
-    """By outcome how many mechanisms ended so, and why the first of them did; by that of what is solved how many lack
-    rates, or digits of them."""
+    """The number of each outcome, how many mechanisms it ends, and the reason of the first of them; for solved ones how
+    many lack rates, or digits of them."""
     status = part.last_status
-    codes, first, counts = np.unique(status[status != 0], return_index=True, return_counts=True)
-    ended = np.flatnonzero(status)
-    found = [(int(codes[k]), int(counts[k]), part.swept(int(ended[first[k]])).reason) for k in np.argsort(first)]
-    few = [each for each in part.others if each.reason and not each.status.any()]
-    return (*found, *([(0, len(few), few[0].reason)] if few else []))
+    counts = np.bincount(status)
+    first_ones = sorted((int(np.argmax(status == code)), code) for code in np.flatnonzero(counts).tolist() if code)
+    endings = [(code, int(counts[code]), part.reason(first)) for first, code in first_ones]
+    without_rates = [swept.reason for swept in part.general.values() if swept.reason and not swept.status.any()]
+    return (*endings, *([(0, len(without_rates), without_rates[0])] if without_rates else []))
 
 
 def end_message(done: int, reason: str) -> tuple[str, ...]:
@@ -111,20 +111,22 @@ def end_message(done: int, reason: str) -> tuple[str, ...]:
     return (f"{reason} after {count_phrase(done, 'mechanism')}: the others are left out",) if reason else ()
 
 
-def part_messages(endings: Iterable[Iterable[tuple[int, int, str]]], many: int, sent: int) -> tuple[str, ...]:
-    """What there is to say of so many mechanisms: how many the general path solved, and by the endings of parts how
-    many ended before their time, with a reason."""
-    told = []
-    if sent:
-        told.append(f"the general path solved {sent} of {count_phrase(many, 'mechanism')}, one after the other")
-    ended: dict[int, tuple[int, str]] = {}
-    for code, count, reason in (each for part in endings for each in part):
-        before, first = ended.get(code, (0, ""))
-        ended[code] = before + count, first or reason
-    few = ended.pop(0, None)
-    told += [
-        f"{count_phrase(count, 'mechanism')}: {OUTCOMES[k].value}; {reason}" for k, (count, reason) in ended.items()
+def part_messages(endings: Iterable[Iterable[tuple[int, int, str]]], count: int, general: int) -> tuple[str, ...]:
+    """The messages about `count` mechanisms, of which the general path solved `general`, by the endings of all
+    parts."""
+    messages = []
+    if general:
+        messages.append(f"the general path solved {general} of {count_phrase(count, 'mechanism')}, one after the other")
+    totals: dict[int, tuple[int, str]] = {}
+    for code, part_count, reason in (ending for part in endings for ending in part):
+        previous, first_reason = totals.get(code, (0, ""))
+        totals[code] = previous + part_count, first_reason or reason
+    without_rates = totals.pop(0, None)
+    messages += [
+        f"{count_phrase(ended, 'mechanism')}: {OUTCOMES[code].value}; {reason}"
+        for code, (ended, reason) in totals.items()
     ]
-    if few:
-        told.append(f"{count_phrase(few[0], 'mechanism')}: rates are missing or have few digits; {few[1]}")
-    return tuple(told)
+    if without_rates:
+        ended, reason = without_rates
+        messages.append(f"{count_phrase(ended, 'mechanism')}: rates are missing or have few digits; {reason}")
+    return tuple(messages)

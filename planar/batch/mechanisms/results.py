@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, overload
+from dataclasses import dataclass, replace
+from typing import NamedTuple, overload
 
 import numpy as np
 
-from planar.foundation.arrays import part_offsets
+from planar.batch.mechanisms.tape_runs import FULL_TURN
+from planar.foundation.arrays import IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.short_repr import short_repr
 
@@ -76,16 +77,6 @@ class Swept(NamedTuple):
         return self._replace(position=rounded(self.position), velocity=rates[0], acceleration=rates[1])
 
 
-def swept_from_rows(names: Sequence[str], rows: Array, inputs: Array, solved: int, outcome: int, reason: str) -> Swept:
-    """One mechanism by rows of its points (points, 2 or 6, steps + 1): x and y, then their first and second rates.
-    The status after the `solved` steps is the number of an outcome."""
-    orders = [PointMapping(names, rows[:, row : row + 2].swapaxes(1, 2)) for row in range(0, rows.shape[1], 2)]
-    status = np.zeros(len(inputs), dtype=np.int8)
-    status[solved:] = outcome
-    position, velocity, acceleration = orders if len(orders) > 1 else (orders[0], None, None)
-    return Swept(position, velocity, acceleration, inputs, status, reason, False)
-
-
 class PointRows(NamedTuple):
     """Points of many mechanisms one after the other: those of mechanism k from first[k] to first[k + 1], in the order
     of its `Swept`; position, velocity and acceleration (points, steps + 1, 2), SI, the latter two None without rates.
@@ -100,72 +91,153 @@ class PointRows(NamedTuple):
         return short_repr(self)
 
 
-class SweptPart(Protocol):
-    """Some mechanisms of a sweep, one after the other."""
+class PointTable(NamedTuple):
+    """The points of mechanisms one after the other: those of mechanism k from first[k] to first[k + 1], each by its
+    number in `labels`, or without labels by the number of its pin."""
 
-    def __len__(self) -> int:
-        """How many mechanisms there are."""
+    first: IntArray
+    codes: IntArray
+    labels: tuple[str, ...] | None = None
 
-    @property
-    def last_status(self) -> Array:
-        """The status at the last step (mechanisms,): 0 where all are solved."""
+    @classmethod
+    def of_names(cls, names: Sequence[Sequence[str]]) -> PointTable:
+        """The table of the names of the points of every mechanism."""
+        codes: dict[str, int] = {}
+        flat = [codes.setdefault(name, len(codes)) for point_names in names for name in point_names]
+        return cls(part_offsets(list(map(len, names))), np.array(flat, dtype=np.int64), tuple(codes))
 
-    @property
-    def others(self) -> Iterable[Swept]:
-        """Those that were not solved as most are: they alone may be of the general path, or have remarks."""
+    def names(self, k: int) -> list[str]:
+        """The names of the points of a mechanism."""
+        codes = self.codes[self.first[k] : self.first[k + 1]].tolist()
+        return [pin_name(code) if self.labels is None else self.labels[code] for code in codes]
 
-    def swept(self, k: int) -> Swept:
-        """One of them."""
+    def rows_of(self, name: str) -> IntArray:
+        """The row of a point (mechanisms,), -1 where a mechanism has no such point."""
+        rows = np.full(len(self.first) - 1, -1)
+        code = pin_number(name) if self.labels is None else {label: k for k, label in enumerate(self.labels)}.get(name)
+        if code is not None:
+            matches = np.flatnonzero(self.codes == code)
+            rows[np.searchsorted(self.first, matches, side="right") - 1] = matches
+        return rows
 
-    def rows(self) -> PointRows:
-        """All their points."""
 
-    def point_rows(self, name: str) -> Array:
-        """The rows of a point in these (mechanisms,), -1 where a mechanism has no such point."""
+def pin_name(number: int) -> str:
+    """The name of a pin by its number."""
+    return f"P{number}"
 
-    def astype(self, dtype: str) -> SweptPart:
-        """The same with numbers of another type."""
+
+def pin_number(name: str) -> int | None:
+    """The number of a pin by its name; None for another name."""
+    number = name[1:]
+    return int(number) if number.isdecimal() and pin_name(int(number)) == name else None
+
+
+class Endings(NamedTuple):
+    """How mechanisms ended (mechanisms,): at which position of its input each starts (rad), the number of solved steps,
+    the number of the outcome that ends them; for dead points of bars which bars (mechanisms, 2) and between which
+    rotations of the input (mechanisms, 2), in rad; for others a sentence by the number of the mechanism."""
+
+    start: Array
+    solved: IntArray
+    outcome: IntArray
+    bars: IntArray
+    near: Array
+    reasons: Mapping[int, str]
 
 
 @dataclass(frozen=True, eq=False)
-class SweptList:
-    """Mechanisms each of which was read already."""
+class SweptPart:
+    """Mechanisms of a sweep, one after the other: x and y of all points, then their first and second rates, `values`
+    (points, 2 or 6, numbers) of which the first `steps` + 1 count. `general`: those that the general path solved.
+    """
 
-    found: tuple[Swept, ...]
+    values: Array
+    steps: int
+    points: PointTable
+    endings: Endings
+    general: Mapping[int, Swept]
 
     def __len__(self) -> int:
-        """See `SweptPart`, as for all others."""
-        return len(self.found)
+        """How many mechanisms there are."""
+        return len(self.endings.start)
 
     @property
-    def last_status(self) -> Array:
-        return np.array([each.status[-1] for each in self.found], dtype=np.int8)
+    def last_status(self) -> IntArray:
+        """The status at the last step (mechanisms,): 0 where all are solved."""
+        status = np.where(self.endings.solved > self.steps, 0, self.endings.outcome).astype(np.int8)
+        for k, swept in self.general.items():
+            status[k] = swept.status[-1]
+        return status
 
-    @property
-    def others(self) -> Iterable[Swept]:
-        return self.found
-
-    def swept(self, k: int) -> Swept:
-        return self.found[k]
-
-    def point_rows(self, name: str) -> Array:
-        found, row = [], 0
-        for each in self.found:
-            found.append(row + list(each.position).index(name) if name in each.position else -1)
-            row += len(each.position)
-        return np.array(found, dtype=np.int64)
-
-    def astype(self, dtype: str) -> SweptList:
-        return SweptList(tuple(each.astype(dtype) for each in self.found))
+    def present_points(self, names: Iterable[str]) -> set[str]:
+        """Those of some names that points of the mechanisms have."""
+        return {name for name in names if np.any(self.points.rows_of(name) >= 0)}
 
     def rows(self) -> PointRows:
-        first = part_offsets([len(each.position) for each in self.found])
-        orders = []
-        for order in ("position", "velocity", "acceleration"):
-            rows = [values for each in self.found for values in (getattr(each, order) or {}).values()]
-            orders.append(np.array(rows) if rows else None)
-        steps = len(self.found[0].status) if self.found else 0
-        return PointRows(first, np.zeros((0, steps, 2)) if orders[0] is None else orders[0], *orders[1:])
+        """All their points."""
+        rows = self.values[:, :, : self.steps + 1]
+        orders = [rows[:, row : row + 2].swapaxes(1, 2) for row in range(0, rows.shape[1], 2)]
+        return PointRows(self.points.first, orders[0], *(orders[1:] or (None, None)))
+
+    def astype(self, dtype: str, values: Array | None = None) -> SweptPart:
+        """The same with numbers of another type, in `values` if they are given."""
+        values = np.empty(self.values.shape, dtype) if values is None else values
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers behind the last step are arbitrary
+            values[...] = self.values
+        return replace(self, values=values, general={k: swept.astype(dtype) for k, swept in self.general.items()})
+
+    def swept(self, k: int) -> Swept:
+        """One of them."""
+        if k in self.general:
+            return self.general[k]
+        names, first = self.points.names(k), self.points.first
+        rows = self.values[first[k] : first[k + 1], :, : self.steps + 1]
+        orders = [PointMapping(names, rows[:, row : row + 2].swapaxes(1, 2)) for row in range(0, rows.shape[1], 2)]
+        position, velocity, acceleration = orders if len(orders) > 1 else (orders[0], None, None)
+        start, solved, outcome, *_ = (part[k] for part in self.endings[:3])
+        status = np.zeros(self.steps + 1, dtype=np.int8)
+        status[solved:] = outcome
+        inputs = start + np.linspace(0.0, 1.0, self.steps + 1) * FULL_TURN
+        return Swept(position, velocity, acceleration, inputs, status, self.reason(k), False)
+
+    def reason(self, k: int) -> str:
+        """Why a mechanism ends before its last step; empty where it does not."""
+        if k in self.general:
+            return self.general[k].reason
+        if self.endings.solved[k] > self.steps:
+            return ""
+        if k in self.endings.reasons:
+            return self.endings.reasons[k]
+        links = ", ".join(f"bar{bar}" for bar in self.endings.bars[k])
+        return dead_point_reason(links, self.endings.start[k] + self.endings.near[k])
+
+
+def dead_point_reason(links: str, inputs: Array) -> str:
+    """Why a mechanism stops whose links come to a dead point between two positions of its input (rad)."""
+    return f"links {links} come to a dead point {between(inputs)}"
+
+
+def between(inputs: Array) -> str:
+    """Between which positions of the input (rad)."""
+    return f"at an input of {inputs[0]:.6g} to {inputs[1]:.6g} rad"
+
+
+def join_parts(parts: Sequence[SweptPart], values: Array) -> SweptPart:
+    """One part of parts of pinned bars that follow one another, whose points are in one array."""
+    if len(parts) == 1:
+        return parts[0]
+    sizes = part_offsets([len(part) for part in parts]).tolist()
+    points = part_offsets([part.points.first[-1] for part in parts])
+    first = np.concatenate([part.points.first[:-1] + k for part, k in zip(parts, points, strict=False)])
+    table = PointTable(np.append(first, points[-1]), np.concatenate([part.points.codes for part in parts]))
+    start, solved, outcome, bars, near = map(np.concatenate, zip(*(part.endings[:-1] for part in parts), strict=True))
+    reasons: dict[int, str] = {}
+    general: dict[int, Swept] = {}
+    for part, begin in zip(parts, sizes, strict=False):
+        reasons |= {begin + k: reason for k, reason in part.endings.reasons.items()}
+        general |= {begin + k: swept for k, swept in part.general.items()}
+    endings = Endings(start, solved, outcome, bars, near, reasons)
+    return SweptPart(values, parts[0].steps, table, endings, general)
 
 
 @dataclass(frozen=True)
@@ -239,7 +311,7 @@ class Each(Sequence[Swept]):
         Not a number where a mechanism has no such point."""
         found = []
         for part in self._parts:
-            values, rows = getattr(part.rows(), order), part.point_rows(name)
+            values, rows = getattr(part.rows(), order), part.points.rows_of(name)
             own = np.full((len(rows), *values.shape[1:]), np.nan)
             own[rows >= 0] = values[rows[rows >= 0]]
             found.append(own)
@@ -252,12 +324,11 @@ class Each(Sequence[Swept]):
         if len(parts) == 1:
             return parts[0]
         counts = np.concatenate([np.zeros(0, dtype=np.int64), *(np.diff(part.first) for part in parts)])
-        kept = [part for part in parts if len(part.position)] or parts[:1]
-        whole = [
-            np.concatenate([each for part in kept if (each := part[1 + order]) is not None])
-            if kept and kept[0][1 + order] is not None
+        orders = [
+            np.concatenate([values for part in parts if (values := part[1 + order]) is not None])
+            if parts and parts[0][1 + order] is not None
             else None
             for order in range(3)
         ]
-        position = np.zeros((0, 0, 2)) if whole[0] is None else whole[0]
-        return PointRows(part_offsets(counts), position, whole[1], whole[2])
+        position = np.zeros((0, 0, 2)) if orders[0] is None else orders[0]
+        return PointRows(part_offsets(counts), position, orders[1], orders[2])

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, clear_rows, padded_steps, run_tape
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, padded_steps, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 
@@ -55,9 +55,9 @@ class BlockKinds(NamedTuple):
 
 
 class TapedLinkages(NamedTuple):
-    """Some linkages, `which` (taped,) by their numbers, as sequences of blocks on a tape: those of one from first[k] to
-    first[k + 1]; of every block the number of its kind, its `slots` (blocks, slots) and numbers p (blocks, numbers);
-    `blocks`: the blocks' own numbers. `tolerance` of what is left open and least `clearance` (taped,)."""
+    """Linkages, `which` (taped,) by their numbers in a part, as sequences of blocks on a tape: those of linkage k from
+    first[k] to first[k + 1]; of every block the number of its kind, its `slots` (blocks, slots), its numbers p (blocks,
+    numbers), and its number in `blocks`; the `tolerance` of residuals and the least `clearance` (taped,)."""
 
     which: IntArray
     first: IntArray
@@ -69,7 +69,7 @@ class TapedLinkages(NamedTuple):
     clearance: Array
 
     def select(self, numbers: IntArray) -> TapedLinkages:
-        """Some of the linkages (numbers, rising)."""
+        """The linkages of these indices (rising)."""
         if len(numbers) == len(self.which):
             return self
         counts = np.diff(self.first)[numbers]
@@ -81,7 +81,7 @@ class TapedLinkages(NamedTuple):
 
 
 class LinkageEnding(NamedTuple):
-    """So many of the first steps are solved; why no more, and what there is to say of it."""
+    """The number of solved steps, the outcome that ends them, and a sentence."""
 
     solved_steps: int
     outcome: Outcome = Outcome.SOLVED
@@ -93,14 +93,18 @@ class FineRun(NamedTuple):
     function that returns x and y of result points (points, 2, steps)."""
 
     good: int
-    turned: Array
+    rotation: Array
     places: Callable[[IntArray], Array]
 
 
-class TapeRun(NamedTuple):
-    """How far linkages came: of each whether it is decided, at how many of its steps it is solved, the number of its
-    outcome then, between which turns of the input, near (linkages, 2) in rad, at which block, and what there is to say
-    of those that end otherwise than at a dead point."""
+FindEnding = Callable[[FineRun], LinkageEnding | None]
+"""Says how a linkage with stops ends; None if that is not sure."""
+
+
+class PartRun(NamedTuple):
+    """How far the linkages of a part came (linkages,): whether that is decided, the number of solved steps, the number
+    of the outcome that ends them; for dead points between which rotations of the inputs (linkages, 2), in rad, and in
+    which block; and sentences by the numbers of linkages."""
 
     is_decided: BoolArray
     solved: IntArray
@@ -109,8 +113,14 @@ class TapeRun(NamedTuple):
     block: IntArray
     reasons: dict[int, str]
 
+    @classmethod
+    def undecided(cls, linkage_count: int) -> PartRun:
+        """The run of a part before anything is decided."""
+        solved, outcome, block = np.zeros((3, linkage_count), dtype=np.int64)
+        return cls(np.zeros(linkage_count, dtype=bool), solved, outcome, np.zeros((linkage_count, 2)), block, {})
 
-OUTCOME_NUMBERS = {each: number for number, each in enumerate(Outcome)}
+
+OUTCOME_NUMBERS = {outcome: number for number, outcome in enumerate(Outcome)}
 DEAD_POINT_NUMBER = OUTCOME_NUMBERS[Outcome.DEAD_POINT]
 
 
@@ -119,33 +129,24 @@ def run_taped_linkages(
     kinds: BlockKinds,
     values: Array,
     steps: int,
-    rates: bool,
-    find_ending: Callable[[int, FineRun], LinkageEnding | None] | None = None,
-    watched: BoolArray | None = None,
-) -> TapeRun:
-    """Run linkages through a turn of their inputs: values (points, `POINT_ROWS`, numbers), see `make_values`, are
-    filled. Entries of the result are those of `taped.which`.
-
-    What is not decided by any attempt is left to others. `find_ending` says how the `watched` ones (taped,) end, None
-    where that is not sure.
+    run: PartRun,
+    find_endings: Mapping[int, FindEnding] = {},
+) -> None:
+    """Run linkages through a turn of their inputs: values (points, `POINT_ROWS`, numbers), see `make_values`, and
+    the `run` are filled. Other solvers take what no attempt decides. `find_endings` are those of linkages with stops.
     """
-    linkage_count = len(taped.which)
-    solved, outcome, block = np.zeros((3, linkage_count), dtype=np.int64)
-    run = TapeRun(np.zeros(linkage_count, dtype=bool), solved, outcome, np.zeros((linkage_count, 2)), block, {})
-    undecided = np.arange(linkage_count)
-    for attempt in _ATTEMPTS if linkage_count else ():
+    undecided = np.arange(len(taped.which))
+    for attempt in _ATTEMPTS if len(undecided) else ():
         finer = step_division(steps) * attempt.refinement
-        for numbers in _chunks(taped, undecided, steps * finer + 1, rates, finer > 1):
-            attempted = _AttemptRun(taped.select(numbers), kinds, attempt.polished, values, steps, finer)
-            attempted.note(run, numbers, find_ending, watched)
-        undecided = undecided[~run.is_decided[undecided]]
+        for indices in _chunks(taped, undecided, padded_steps(steps * finer + 1) * values.shape[1] * 8, finer > 1):
+            _AttemptRun(taped.select(indices), kinds, attempt.polished, values, steps, finer).note(run, find_endings)
+        undecided = undecided[~run.is_decided[taped.which[undecided]]]
         if not undecided.size:
             break
-    return run
 
 
 def step_division(steps: int) -> int:
-    """Into how many a step is divided."""
+    """The number of parts into which a step is divided."""
     return ceil(FULL_TURN / steps / LONGEST_INPUT_STEP)
 
 
@@ -158,30 +159,24 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
     return made[first : first + size].reshape(shape)
 
 
-def clear_points(values: Array, first_point: IntArray, which: IntArray, first_step: IntArray) -> None:
-    """The points of some linkages, from first_point[k] to first_point[k + 1], are NaN from a step of each on."""
-    if not len(which):
-        return
-    counts = np.diff(first_point)[which]
-    begin = np.cumsum(counts) - counts
-    points = np.repeat(first_point[which] - begin, counts) + np.arange(counts.sum())
-    steps = np.repeat(first_step, counts)
-    rows = values.ctypes.data + points[:, None] * values.strides[0] + np.arange(values.shape[1]) * values.strides[1]
-    clear_rows(rows.ravel(), np.repeat(steps, values.shape[1]), values.shape[2])
+def clear_points(values: Array, first: IntArray, which: IntArray, first_step: IntArray) -> None:
+    """Set the points of linkages, of linkage k from first[k] to first[k + 1], to NaN from a step of each on."""
+    for begin, end, step in zip(first[which].tolist(), first[which + 1].tolist(), first_step.tolist(), strict=True):
+        values[begin:end, :, step:] = np.nan
 
 
-def _chunks(taped: TapedLinkages, numbers: IntArray, steps: int, rates: bool, apart: bool) -> Iterator[IntArray]:
+def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divided: bool) -> Iterator[IntArray]:
     """Yield parts of the linkages whose result points at divided steps fit into `MAX_FINE_BYTES`."""
-    if not apart:
-        yield numbers
+    if not is_divided:
+        yield indices
         return
     point_counts = np.add.reduceat((taped.slots >= 0).sum(axis=1), taped.first[:-1])
-    ends = np.cumsum(point_counts[numbers] * (padded_steps(steps) * POINT_ROWS[rates] * 8))
+    ends = np.cumsum(point_counts[indices] * point_bytes)
     first = 0
-    while first < len(numbers):
+    while first < len(indices):
         size_before = ends[first - 1] if first else 0
         last = max(int(np.searchsorted(ends, size_before + MAX_FINE_BYTES, side="right")), first + 1)
-        yield numbers[first:last]
+        yield indices[first:last]
         first = last
 
 
@@ -191,17 +186,17 @@ class _AttemptRun:
     def __init__(self, taped: TapedLinkages, kinds: BlockKinds, polished: bool, values: Array, steps: int, finer: int):
         self.taped, self.finer, self.count = taped, finer, steps * finer + 1
         stride = padded_steps(self.count)
-        self.turned = np.arange(stride) * (FULL_TURN / (self.count - 1))
+        self.rotation = np.arange(stride) * (FULL_TURN / (self.count - 1))
         self.rows: IntArray | None = None
         refs, points = taped.slots, values
         if finer > 1:
-            is_told = refs >= 0
-            self.rows, places = np.unique(refs[is_told], return_inverse=True)
+            is_result = refs >= 0
+            self.rows, places = np.unique(refs[is_result], return_inverse=True)
             points, refs = np.empty((len(self.rows), values.shape[1], stride)), refs.copy()
-            refs[is_told] = places
+            refs[is_result] = places
         self.points = points
         room = np.empty((max(-int(refs.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
-        room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.turned), np.sin(self.turned), self.turned
+        room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.rotation), np.sin(self.rotation), self.rotation
         if kinds.frame_rows:
             room[-1 - FRAME] = 0.0
             for row, value in kinds.frame_rows.items():
@@ -224,29 +219,19 @@ class _AttemptRun:
         if self.rows is not None:
             values[self.rows, :, : steps + 1] = points[:, :, : self.count : finer]
 
-    def note(
-        self,
-        run: TapeRun,
-        numbers: IntArray,
-        find_ending: Callable[[int, FineRun], LinkageEnding | None] | None,
-        watched: BoolArray | None,
-    ) -> None:
-        """Store the decided linkages in the run; `numbers` are their indices on the complete tape."""
+    def note(self, run: PartRun, find_endings: Mapping[int, FindEnding]) -> None:
+        """Store the decided linkages in the run of the part."""
         good_counts, outcome, last_blocks = self.result
-        sure_indices = np.flatnonzero(outcome != UNDECIDED)
-        decided = numbers[sure_indices]
-        run.is_decided[decided] = True
-        run.solved[decided] = (good_counts[sure_indices] - 1) // self.finer + 1
-        dead = sure_indices[outcome[sure_indices] == DEAD_POINT]
-        run.outcome[numbers[dead]] = DEAD_POINT_NUMBER
-        run.near[numbers[dead]] = np.stack([self.turned[good_counts[dead] - 1], self.turned[good_counts[dead]]], axis=1)
-        run.block[numbers[dead]] = self.taped.blocks[last_blocks[dead]]
-        if find_ending is None or watched is None:
-            return
-        for k in np.flatnonzero(watched[numbers] & (good_counts > 0)).tolist():
-            fine = FineRun(int(good_counts[k]), self.turned[: self.count], self._places)
-            ending = find_ending(int(self.taped.which[k]), fine)
-            number = int(numbers[k])
+        which, is_sure, is_dead = self.taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
+        run.is_decided[which[is_sure]] = True
+        run.solved[which[is_sure]] = (good_counts[is_sure] - 1) // self.finer + 1
+        good, dead = good_counts[is_dead], which[is_dead]
+        run.outcome[dead], run.block[dead] = DEAD_POINT_NUMBER, self.taped.blocks[last_blocks[is_dead]]
+        run.near[dead] = np.stack([self.rotation[good - 1], self.rotation[good]], axis=1)
+        for k, number in enumerate(which.tolist()) if find_endings else ():
+            if number not in find_endings or not good_counts[k]:
+                continue
+            ending = find_endings[number](FineRun(int(good_counts[k]), self.rotation[: self.count], self._places))
             run.is_decided[number] = ending is not None
             if ending is not None:
                 run.solved[number] = (ending.solved_steps - 1) // self.finer + 1

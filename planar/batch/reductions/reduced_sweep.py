@@ -14,8 +14,9 @@ from numpy.typing import DTypeLike
 from planar.batch.block import SolvedDesigns
 from planar.batch.executor import in_order, run_tasks
 from planar.batch.mechanisms.linkages import SweepRequest
+from planar.batch.mechanisms.part_runs import solve_part
 from planar.batch.mechanisms.parts import PartRuns, end_message, find_endings, part_messages, stream_parts
-from planar.batch.mechanisms.results import Each, SweptPart
+from planar.batch.mechanisms.results import Each
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.reductions.point_reductions import (
     EXTREMES_ENDING,
@@ -28,7 +29,7 @@ from planar.batch.reductions.point_reductions import (
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import INTERRUPTED, BlockStore, MemoryStore, SweepPlan
 from planar.document.first_argument import MechanismSource
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.short_repr import short_repr
 from planar.foundation.time_limit import interrupted, time_is_over
@@ -90,7 +91,7 @@ class ReducedBlock(NamedTuple):
     the rest."""
 
     reduced: dict[str, Array]
-    status: Array
+    status: IntArray
     general_positions: int
     general_designs: int
     endings: tuple[tuple[int, int, Any], ...]
@@ -244,15 +245,11 @@ class ReductionStore(BlockStore):
         return swept if listed is None else replace(swept, design=listed.design, assembly=listed.number)
 
 
-SolvePart = Callable[[list[Mechanism] | PinnedLinkages, SweepRequest, str], SweptPart]
-
-
 def sweep_reduced(
     mechanisms: Iterable[MechanismSource | PinnedLinkages],
     request: SweepRequest,
     runs: PartRuns,
     reduce: Mapping[str, str | Reduction[Each]],
-    solve: SolvePart,
 ) -> ReducedSweep:
     """Reductions alone of all mechanisms, of which only those are held that are being solved."""
     wanted = read_reductions(reduce, str, request.steps)
@@ -261,7 +258,7 @@ def sweep_reduced(
             raise BadInput("reduce", f"mechanisms tell points alone, not {each.name}.{each.quantity}")
     points, rates = wanted.with_points(request.points, request.rates)
     request = request._replace(points=points, rates=rates)
-    solve_part = partial(_solve_and_reduce, solve=solve, request=request, reductions=wanted.functions, dtype=runs.dtype)
+    reduce_part = partial(_solve_and_reduce, request=request, reductions=wanted.functions, dtype=runs.dtype)
     blocks: list[ReducedBlock] = []
     done, missing = 0, set(points or ())
     taken = 0
@@ -273,12 +270,12 @@ def sweep_reduced(
             yield taken - 1, part
 
     for block, there in in_order(
-        run_tasks(runs.threads, runs.executor, solve_part, tasks(), lambda _, part: solve_part(part))
+        run_tasks(runs.threads, runs.executor, reduce_part, tasks(), lambda _, part: reduce_part(part))
     ):
         blocks.append(block)
         missing -= there
         done += len(block.status)
-        runs.tell(done, max(done, length_hint(mechanisms, 0)))
+        runs.report(done, max(done, length_hint(mechanisms, 0)))
     reason = time_is_over() if taken > len(blocks) else ""
     if reason and not blocks:
         raise interrupted(reason, "before a mechanism was reduced")
@@ -292,15 +289,13 @@ def sweep_reduced(
 
 def _solve_and_reduce(
     part: list[Mechanism] | PinnedLinkages,
-    solve: SolvePart,
     request: SweepRequest,
     reductions: Mapping[str, Reduction[Each]],
     dtype: str,
 ) -> tuple[ReducedBlock, set[str]]:
     """Reductions of some mechanisms, and which of the points that are wanted are there."""
-    solved = solve(part, request, "float64")
-    general = [swept for swept in solved.others if swept.general]
-    positions = sum(int(np.sum(swept.status == 0)) for swept in general)
-    reduced = reduce_all(Each((solved,), positions, len(general), ()), reductions, dtype)
-    block = ReducedBlock(reduced, solved.last_status, positions, len(general), find_endings(solved))
-    return block, {name for name in request.points or () if np.any(solved.point_rows(name) >= 0)}
+    solved = solve_part(part, request)
+    positions = sum(int(np.sum(swept.status == 0)) for swept in solved.general.values())
+    reduced = reduce_all(Each((solved,), positions, len(solved.general), ()), reductions, dtype)
+    block = ReducedBlock(reduced, solved.last_status, positions, len(solved.general), find_endings(solved))
+    return block, solved.present_points(request.points or ())
