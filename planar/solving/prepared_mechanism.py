@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceFunctions, Scales
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import pair_numbers_from, shapes_of_links, size_from_extents
-from planar.equations.residuals import pair_residuals, wrapped_residual
+from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links, size_from_extents
+from planar.equations.residuals import pair_residuals, split_pair_numbers, wrapped_residual
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
@@ -22,7 +22,7 @@ from planar.model.link_shapes import shape_extent
 from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, pair_misfits
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
-from planar.solving.checks.residual_check import ResidualCheck
+from planar.solving.checks.residual_check import residual_tolerance, stack_motion
 from planar.solving.structure import mechanism_structure
 
 if TYPE_CHECKING:
@@ -30,6 +30,53 @@ if TYPE_CHECKING:
 
 ZERO_POSITION = 1e-14
 """rad or sizes: a position of an input that was solved for and is nearer to zero is there."""
+
+
+class LazyFrames:
+    """Frames of links and own coordinates of pairs of solved positions, computed when they are first read.
+
+    `coordinate_rates` are the value and the rates of w (coordinates,), lengths in sizes, or (rows, coordinates) of a
+    motion.
+    """
+
+    def __init__(self, setup: PreparedMechanism, coordinate_rates: Iterable[Array]):
+        self.column, self.shapes, self.pairs, self.scale = setup.column, setup.shapes, setup.pairs, setup.scale
+        self.coordinate_rates = coordinate_rates
+
+    @cached_property
+    def frames_and_own(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        """The frames of all links and the own coordinates of all pairs, as jets (m, rad, s)."""
+        scaled = [rates * self.scale for rates in self.coordinate_rates]
+        columns = [rates.T if rates.ndim > 1 else rates.tolist() for rates in scaled]
+        jets = [Jet(*rates) for rates in zip(*columns, strict=True)]
+        return frames_from_coordinates(jets, self.column, self.shapes, self.pairs)
+
+
+class LazyFrameMapping(Mapping[str, Any]):
+    """The frames (index 0) or the own coordinates (index 1) of `LazyFrames`, by name."""
+
+    def __init__(self, source: LazyFrames, index: int):
+        self.source, self.index = source, index
+
+    def __getitem__(self, name: str) -> Any:
+        return self.source.frames_and_own[self.index][name]
+
+    def __or__(self, other: Mapping[str, Any]) -> dict[str, Any]:
+        return {**self, **other}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((self.source.shapes, self.source.pairs)[self.index])
+
+    def __len__(self) -> int:
+        return len((self.source.shapes, self.source.pairs)[self.index])
+
+
+def lazy_frames(
+    setup: PreparedMechanism, coordinate_rates: Iterable[Array]
+) -> tuple[LazyFrameMapping, LazyFrameMapping]:
+    """Frames of links and own coordinates of pairs; see `LazyFrames`."""
+    source = LazyFrames(setup, coordinate_rates)
+    return LazyFrameMapping(source, 0), LazyFrameMapping(source, 1)
 
 
 class PositionInputs(NamedTuple):
@@ -65,14 +112,18 @@ class PreparedMechanism:
                     raise BadInput(f"{name}.{point}", told)
         extents = {name: shape_extent(shape) for name, shape in self.shapes.items()}
         self.unit = size_from_extents(mechanism, extents, self.structure.input_slides)
-        self.residual_check = ResidualCheck(mechanism, self.shapes, self.unit, self.relative_motions)
+        self.input_scale = np.where(self.structure.input_slides, self.unit, 1.0)
+        "the units of the inputs (inputs,), m or rad"
         self.scale = np.where(self.structure.is_length, self.unit, 1.0)
         self.reach = {name: each / self.unit for name, each in extents.items()}
         self.has_extent = any(self.reach.values())
         "whether the unit is a length of some link, and no slide's travel"
-        numbers = pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
+        numbers = pair_numbers(mechanism, self.shapes, self.unit)
+        kinds = [kind for pair in mechanism.pairs for kind in pair.number_kinds]
+        reach = np.abs(numbers[[kind is MeasureKind.LENGTH for kind in kinds]]).max(initial=0.0)
+        self.tolerance = float(residual_tolerance(len(mechanism.links), reach))
+        "what the residual check lets pass: round-off of the residual, in lengths of the size"
         if self.equations.open_rows:
-            self.residual_check.open_rows = frozenset(self.equations.open_rows)
             numbers = np.append(numbers, self._misfit_weights())
         self.inputs = PositionInputs(*self._inputs(mechanism), numbers)
 
@@ -84,7 +135,7 @@ class PreparedMechanism:
             return there.with_functions(self.functions) if self.is_deflated else there
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
-        there.mechanism, there.residual_check = mechanism, self.residual_check.with_inputs_of(mechanism)
+        there.mechanism = mechanism
         there.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
         return there
 
@@ -125,7 +176,7 @@ class PreparedMechanism:
     def _misfit_weights(self) -> Array:
         """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
         stiffness = dict(self.mechanism.pair_stiffness)
-        owners = [self.residual_check.row_pairs[row] for row in self.equations.open_rows]
+        owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
         found = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
         return found / found.max()
 
@@ -141,7 +192,7 @@ class PreparedMechanism:
         w = self.functions.coordinates(z, u, self.inputs.p)
         found: dict[str, Array] = {}
         for row, column in zip(self.equations.open_rows, self.equations.misfit_columns, strict=True):
-            name = self.residual_check.row_pairs[row]
+            name = self.structure.residual_check.row_pairs[row]
             found[name] = np.hypot(found.get(name, 0.0), w[:, column] * self.unit)
         return found
 
@@ -161,13 +212,6 @@ class PreparedMechanism:
             curvature = across @ curvature @ across.transpose(0, 2, 1)
         return np.linalg.eigvalsh(curvature).min(axis=1, initial=1.0) > 0.0
 
-    def _least_misfit_residuals(self, z: Array, u: Array, w: Array, of_pairs: Array) -> Array:
-        """How far misfits (coordinates, samples) are from what pairs leave open, and from being the least."""
-        e = self.equations
-        own = np.abs(of_pairs - w[list(e.misfit_columns)])
-        y = np.hstack([z, u])
-        return np.vstack([own, np.abs(self.functions.kinematics(y, 0.0 * y, 0.0 * y, self.inputs.p).F.T)])
-
     @property
     def is_deflated(self) -> bool:
         """Whether it has more constraints than those of its pairs and inputs."""
@@ -180,7 +224,7 @@ class PreparedMechanism:
 
     def scaled_inputs(self, mechanism: Mechanism) -> Iterator[list[float]]:
         """Positions, velocities and accelerations of a mechanism's inputs, lengths in sizes."""
-        sizes = [self.unit if slides else 1.0 for slides in self.structure.input_slides]
+        sizes = self.input_scale.tolist()
         yield [given.position / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
         yield [given.velocity / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
         yield [given.acceleration / size for given, size in zip(mechanism.inputs, sizes, strict=True)]
@@ -228,19 +272,9 @@ class PreparedMechanism:
         return found
 
     @property
-    def tolerance(self) -> float:
-        """What the residual check lets pass: round-off of the residual, in lengths of the size."""
-        return self.residual_check.tolerance
-
-    @cached_property
-    def _input_scale(self) -> Array:
-        """What inputs are in units of (inputs,): m for one of the size, rad."""
-        return np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
-
-    @property
     def row_pairs(self) -> list[str]:
         """The pair of every row of `residuals`."""
-        e, check = self.equations, self.residual_check
+        e, check = self.equations, self.structure.residual_check
         more = [check.row_pairs[row] for row in e.open_rows] + [row.pair for row in e.rows]
         return check.row_pairs + (more if e.open_rows else [])
 
@@ -250,35 +284,42 @@ class PreparedMechanism:
         Of pairs that may stay open first nothing, then how far what they leave open is from their misfits, and how far
         these are from being the least.
         """
-        w = self.functions.coordinates(z, u, self.inputs.p).T
+        w = self.functions.coordinates(z, u, self.inputs.p)
+        constraint_residuals = self.coordinate_residuals(w, u)
+        if not self.equations.open_rows:
+            return constraint_residuals
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
-            frames, own = frames_from_coordinates(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            found = self.residual_check.residuals(frames, own, u.T * self._input_scale[:, None]).reshape(-1, len(z))
-            if not self.equations.open_rows:
-                return found
-            misfits = (
-                np.array(np.broadcast_arrays(*self._misfits(frames, own)))
-                / self.scale[list(self.equations.misfit_columns), None]
-            )
-            return np.vstack([found, self._least_misfit_residuals(z, u, w, misfits)])
+            misfit_errors = np.abs(self._misfits(w) - w[:, list(self.equations.misfit_columns)])
+        y = np.hstack([z, u])
+        imbalance = np.abs(self.functions.kinematics(y, 0.0 * y, 0.0 * y, self.inputs.p).F)
+        return np.vstack([constraint_residuals, misfit_errors.T, imbalance.T])
 
-    def _misfits(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:
-        """What each row that may stay open leaves open, by the pairs' own formulas (m, rad)."""
-        rows = list(pair_residuals(self.mechanism.pairs, frames, self.residual_check.numbers, own))
-        return [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
+    def coordinate_residuals(self, w: Array, u: Array) -> Array:
+        """The residuals of the pairs and inputs alone (rows, samples), from all coordinates w (samples, coordinates)
+        and inputs u (samples, inputs)."""
+        return self.structure.residual_check.residuals(stack_motion([w], [u]), self.inputs.p)
+
+    def _misfits(self, w: Array) -> Array:
+        """What each row that may stay open leaves open (..., rows) at coordinates w (..., coordinates), by the pairs'
+        own formulas."""
+        frames, own = frames_from_coordinates(w.T, self.column, self.shapes, self.pairs)
+        numbers = split_pair_numbers(self.mechanism.pairs, self.inputs.p.tolist())
+        rows = list(pair_residuals(self.mechanism.pairs, frames, numbers, own))
+        misfits = [wrapped_residual(rows[k][1], rows[k][0].kind) for k in self.equations.open_rows]
+        return np.array(np.broadcast_arrays(*misfits)).T
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
-        """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
+        """w (..., coordinates) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
         parts = {(link, name): getattr(frame, name) for link, frame in frames.items() for name in ("x", "y", "angle")}
-        for pair, values in own.items():
-            parts |= {
-                (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinate_kinds, values, strict=True)
-            }
+        for pair, coordinates in own.items():
+            kinds = self.pairs[pair].coordinate_kinds
+            parts |= {(pair, name): value for (name, _), value in zip(kinds, coordinates, strict=True)}
+        values = (parts.get(coordinate[:2], 0.0) for coordinate in self.equations.coordinates)
+        positions = [value.parts[0] if isinstance(value, Jet) else value for value in values]
+        w: Array = np.array(np.broadcast_arrays(*positions), dtype=float).T / self.scale
         if self.equations.open_rows:
-            left = zip(self.equations.misfit_columns, self._misfits(frames, own), strict=True)
-            parts |= {self.equations.coordinates[column][:2]: value for column, value in left}
-        found = (parts.get(each[:2], 0.0) for each in self.equations.coordinates)
-        return np.array([value.parts[0] if isinstance(value, Jet) else value for value in found]) / self.scale
+            w[..., list(self.equations.misfit_columns)] = self._misfits(w)
+        return w
 
     def max_residuals(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
@@ -287,6 +328,11 @@ class PreparedMechanism:
     def max_residual(self, z: Array, u: Array) -> float:
         """The same at one position, z (unknowns,) and u (inputs,)."""
         return float(self.max_residuals(z[None], u[None])[0])
+
+    def worst_residual(self, z: Array) -> tuple[float, str]:
+        """The same at the mechanism's own inputs, z (unknowns,), and the pair of that constraint."""
+        residuals = self.residuals(z[None], self.inputs.u[None])[:, 0]
+        return (float(residuals.max()), self.row_pairs[int(np.argmax(residuals))]) if residuals.size else (0.0, "")
 
     def describe_position(self) -> str:
         """The file's own position in words: at A = 60 deg."""

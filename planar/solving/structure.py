@@ -22,6 +22,7 @@ from planar.model.mechanism import (
     relative_motions,
 )
 from planar.model.pairs import MeasureKind, Pair
+from planar.solving.checks.residual_check import ResidualCheck
 
 
 class PointLocations(NamedTuple):
@@ -58,6 +59,11 @@ class MechanismStructure:
     @cached_property
     def _acceptance(self) -> AcceptanceFunctions:
         return acceptance_functions(self.mechanism)
+
+    @cached_property
+    def residual_check(self) -> ResidualCheck:
+        """What judges positions by the pairs' own formulas."""
+        return ResidualCheck(self.mechanism, self.column, self.equations.open_rows)
 
     @cached_property
     def point_locations(self) -> PointLocations:

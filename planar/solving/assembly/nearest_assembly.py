@@ -1,24 +1,17 @@
-"""The assembly nearest to the sketch, found block after block, and how far from the sketch it lies."""
+"""The assembly nearest to the sketch, found block after block."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
 from itertools import count
-from math import hypot, pi, remainder, tau
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
-from planar.foundation.geometry import GROUND
-from planar.foundation.units import parse_unit
-from planar.model.link_shapes import fitted_frame
-from planar.model.mechanism import named_points, sketched_places
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
-from planar.solving.prepared_mechanism import PreparedMechanism
 
 EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
@@ -29,10 +22,6 @@ MAX_BEST_FIRST_EFFORT = 3000.0
 the search looks for a nearer assembly; beyond it takes the best partial one to an end."""
 MAX_REPEATED_EFFORT = 1.2 * MAX_BEST_FIRST_EFFORT
 """The same effort at which the search stops without an assembly: combinations of earlier blocks grow exponentially."""
-FAR_FROM_SKETCH = 0.1
-"""The part of the mechanism's size by which a point may be off its sketch without a remark."""
-TURNED_FROM_SKETCH = pi / 4
-"""The angle (rad) by which a link may be turned against its sketched points without a remark."""
 
 
 class Assembly(NamedTuple):
@@ -164,41 +153,3 @@ def find_nearest_assembly(
         is_cut_off = bool(heap) and not groups.is_hopeless
         return failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
-
-
-def sketch_distance_remarks(setup: PreparedMechanism, z: Array) -> tuple[str, ...]:
-    """A sentence on an assembly that lies far from the sketch: the farthest point, and the link that is turned most."""
-    mechanism, places = setup.mechanism, sketched_places(setup.mechanism)
-    w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p) * setup.scale
-    frames, _ = frames_from_coordinates(w, setup.column, [*places], {})
-    frames[mechanism.frame] = GROUND
-    distances = {
-        (link, point): hypot(*(frames[link].to_world(setup.shapes[link].position(point)) - place))
-        for link, points in places.items()
-        for point, place in points.items()
-    }
-    turns = {
-        link: remainder(float(frames[link].angle) - sketched.angle, tau)
-        for link, points in places.items()
-        if link != mechanism.frame and (sketched := fitted_frame(setup.shapes[link], points)) is not None
-    }
-    clauses = []
-    farthest = max(distances, key=lambda member: distances[member])
-    if distances[farthest] > FAR_FROM_SKETCH * _diagonal(setup, w):
-        name = next(point.name for point in named_points(mechanism) if farthest in point.members)
-        distance = parse_unit(mechanism.units.length).from_si(float(distances[farthest]))
-        clauses.append(f"{name} is {distance:.4g} {mechanism.units.length} from where it is sketched")
-    link = max(turns, key=lambda name: abs(turns[name]), default="")
-    if link and abs(turns[link]) > TURNED_FROM_SKETCH:
-        clauses.append(f"link {link!r} is turned by {turns[link] * 180 / pi:.4g} deg against its sketched points")
-    if not clauses:
-        return ()
-    return (f"at the file's inputs {' and '.join(clauses)}, far from the sketch; check lengths, angles and sketch",)
-
-
-def _diagonal(setup: PreparedMechanism, w: Array) -> float:
-    """The diagonal (m) of the box round all points of links."""
-    frames, _ = frames_from_coordinates(w, setup.column, [*setup.shapes], {})
-    points = [frames[link].to_world(point) for link, shape in setup.shapes.items() for point in shape.points.values()]
-    x, y = [float(point.x) for point in points], [float(point.y) for point in points]
-    return hypot(max(x) - min(x), max(y) - min(y))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planar.equations.functions import EquationRates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.solving.diagnosis import refusals
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -26,12 +26,16 @@ class SingularPosition(Exception):
         self.refusal = refused
 
 
-def determined_mobility(setup: PreparedMechanism, z: np.ndarray, motion: EquationRates) -> int:
+def determined_mobility(setup: PreparedMechanism, z: Array) -> int:
     """The mobility at a position; raises NoAnswer where the velocity is not determined, or contradicted.
 
     Raises SingularPosition where the next orders have to tell whether it is determined.
     """
-    inputs = setup.inputs.u.size
+    s, rest = setup.inputs, np.zeros_like(z)
+    inputs = s.u.size
+    # the unknowns rest while the inputs move
+    y, y1, y2 = (np.concatenate(parts) for parts in ((z, s.u), (rest, s.u1), (rest, s.u2)))
+    motion = setup.functions.kinematics(y, y1, y2, s.p)
     mobility, weak = freedom_by_rank(setup, motion)
     if not weak:
         if mobility < inputs and not input_rates_agree(setup, motion):

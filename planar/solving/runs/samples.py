@@ -11,20 +11,19 @@ import numpy as np
 from planar.equations.acceptance import InputSamples
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import FollowedPath, Motion
 from planar.results.records import InputMotion, ThirdRates
-from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR
+from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR, stack_motion
 from planar.solving.continuation.change_point_remarks import change_point_remarks
 from planar.solving.continuation.fast_path import FastSamples, concatenate_samples
 from planar.solving.continuation.path import FollowedSamples
 from planar.solving.continuation.path_pieces import BranchRates, PathBifurcation
 from planar.solving.continuation.predictor_corrector import NearbyBifurcation
 from planar.solving.diagnosis import refusals
-from planar.solving.lazy_frames import lazy_frames
 from planar.solving.position import PositionSolver
+from planar.solving.prepared_mechanism import lazy_frames
 from planar.solving.rates.accuracy import AccuracyDoubts
 from planar.solving.rates.sample_rates import InputRates, sample_rates
 
@@ -235,12 +234,11 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
         part[list(run.dead_points)] = np.nan
     if doubt is not None:
         remarks += _remove_inexact_rates(solver, given, parts, doubt, is_part)
-    frames, own = lazy_frames(solver, parts[:3])
+    motion = stack_motion(parts[:3], given[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
-    inputs = [_input_motion(solver, given, index) for index in range(len(solver.mechanism.inputs))]
-    gaps_of_rates = solver.residual_check.rate_residuals(frames, own, [Jet(*each) for each in inputs])
+    gaps_of_rates = solver.structure.residual_check.rate_residuals(motion, solver.inputs.p)
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
-        of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
+        of_rows = np.where(determined, broken, 0.0)
         wrong = of_rows > 1e3 * solver.tolerance
         if not wrong.any():
             continue
@@ -252,7 +250,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
             part[wrong] = np.nan
         remarks = (*remarks, f"{at} no rates are given: they would break pair {pair!r}, next to a change point")
         determined &= ~wrong
-    solver.refuse_open_contact(frames, own)
+    solver.refuse_open_contact(motion)
     return _CheckedRates(parts, residual, remarks)
 
 
