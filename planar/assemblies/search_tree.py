@@ -17,7 +17,7 @@ from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.time_limit import stop_if_over
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies, is_out_of_reach
-from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
+from planar.solving.newton import CLOSED_TOLERANCE, block_residual_function, one_system, repeat_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
@@ -338,22 +338,11 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
     """Whether the Jacobian of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
-    closing, many = _residual_function(setup, stage, z), slice_length(stage.unknowns)
+    many = slice_length(stage.unknowns)
+    closing = one_system(block_residual_function(setup.functions, stage, z, setup.inputs.u, setup.inputs.p))
     slope = closing(np.zeros(many))[1]
     others = (closing(each)[1] for each in generic_numbers(2, many))
     return all(np.abs(other - slope).max(initial=0.0) <= JACOBIAN_ROUNDING for other in others)
-
-
-def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
-    """What a block leaves open (rows,) and its Jacobian (rows, unknowns) at its own unknowns."""
-
-    def closing(own: Array) -> tuple[Array, Array]:
-        whole = z.copy()
-        whole[stage.unknowns] = own
-        left, slope = setup.functions.block_call(stage)(whole, setup.inputs.u, setup.inputs.p)
-        return left[0], slope.T
-
-    return closing
 
 
 def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
@@ -362,8 +351,7 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
     rows = e.rows[stage.rows]
     if len(rows) != many or (many > 1 and any(row.kind is MeasureKind.ANGLE for row in rows)):
         return None
-
-    closing = _residual_function(setup, stage, z)
+    closing = one_system(block_residual_function(setup.functions, stage, z, setup.inputs.u, setup.inputs.p))
     at: Array = np.zeros(many)
     slope = closing(at)[1]
     if not is_linear(setup, stage, z):

@@ -11,10 +11,9 @@ import numpy as np
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Input, Mechanism, named_points
 from planar.model.wording import quote_names
-from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.checks.singular_values import null_space
 from planar.solving.diagnosis.refusals import free_links
-from planar.solving.full_constraints import MAX_STARTS, FullConstraints
+from planar.solving.full_constraints import MAX_STARTS, FullConstraints, sketch_coordinates
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MIN_DRIVEN_SHARE = 1e-3

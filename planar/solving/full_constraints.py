@@ -18,10 +18,11 @@ from planar.equations.residuals import ConstraintRow, input_positions, pair_resi
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.geometry import Frame
+from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
+from planar.model.link_shapes import fitted_frame
+from planar.model.mechanism import named_points, sketched_places
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.checks.singular_values import null_space
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -31,6 +32,8 @@ NEAR_DAMPING = 1e-6
 """Of first steps: what is looked for is near by."""
 MAX_STARTS = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
+START_SPREAD = 0.5
+"""Sizes, rad: how far starts after the first are spread about what the sketch shows."""
 PROBE_DISTANCE = 0.02
 """How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
 MIN_PROBES, MAX_PROBES = 3, 12
@@ -173,6 +176,33 @@ class FullConstraints:
             },
             consecutive_ranges({name: len(values) for name, values in self._numbers.items()}),
         )
+
+
+def sketch_coordinates(setup: PreparedMechanism, seed: int) -> Array:
+    """Coordinates w with the links about where the sketch has their points; what it does not show is at random.
+
+    Pins on the frame are where the frame has them.
+    """
+    rng = np.random.default_rng(seed)
+    w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
+    frame, places = setup.mechanism.frame, sketched_places(setup.mechanism)
+    for named in named_points(setup.mechanism):
+        on_frame = [setup.shapes[frame].points[point] for link, point in named.members if link == frame]
+        for link, point in named.members if on_frame else ():
+            places.setdefault(link, {})[point] = on_frame[-1]
+    for link, points in places.items():
+        if (link, "x") not in setup.column:
+            continue
+        columns = [setup.column[link, part] for part in FRAME_PARTS]
+        fitted = fitted_frame(setup.shapes[link], points)
+        if fitted is None:
+            angle = float(w[columns[2]]) * np.pi
+            axis = Vector(np.cos(angle), np.sin(angle))
+            origins = [place - setup.shapes[link].points[point].rotate(axis) for point, place in points.items()]
+            w[columns] = *(np.mean(origins, axis=0) / setup.unit), angle
+        else:
+            w[columns] = fitted.x / setup.unit, fitted.y / setup.unit, fitted.angle
+    return w + (START_SPREAD * rng.normal(size=w.size) if seed else 0.0)
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:

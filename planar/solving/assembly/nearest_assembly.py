@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import count
 from typing import NamedTuple
 
@@ -92,9 +92,9 @@ class _Node(NamedTuple):
     "blocks in which another choice lies as near to the sketch"
 
 
-def _failure_beyond(node: _Node, stages: Sequence[Block]) -> AssemblySearchFailure:
-    """What to say of a search that stopped before any block failed."""
-    return AssemblySearchFailure(stages[len(node.ranks)], node.z)
+def _deepest_index(heap: Sequence[_Node]) -> int:
+    """The partial assembly of most blocks, of several the best."""
+    return min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4]))
 
 
 def find_nearest_assembly(
@@ -109,47 +109,46 @@ def find_nearest_assembly(
     stages = candidates.equations.blocks
     number, groups = count(), _BlockSearch(candidates)
     heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
-    chosen: _Node | None = None
-    taken: _Node | None = None
-    tied = 0
+    nearest: list[_Node] = []  # whole assemblies, of equal cost
+    regular: _Node | None = None
     while heap:
         is_best_first = candidates.repeated_effort < MAX_BEST_FIRST_EFFORT
-        if candidates.repeated_effort >= MAX_REPEATED_EFFORT or (chosen is not None and not is_best_first):
+        if candidates.repeated_effort >= MAX_REPEATED_EFFORT or (nearest and not is_best_first):
             break
-        if is_best_first:
-            node = heapq.heappop(heap)
-        else:
-            node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
-        if chosen is not None and node.cost > chosen.cost:
-            return Assembly((taken or chosen).z, (taken or chosen).ties if tied else ())
+        node = heapq.heappop(heap) if is_best_first else heap.pop(_deepest_index(heap))
+        if nearest and node.cost > nearest[0].cost:
+            heap.clear()
+            break
         if len(node.ranks) == len(stages):
-            tied += chosen is not None
-            chosen = chosen or node
-            if taken is None and (is_regular is None or is_regular(node.z)):
-                taken = node
-            if tied and (taken is not None or tied > MAX_TIED):
-                return Assembly((taken or chosen).z, (taken or chosen).ties)
+            nearest.append(node)
+            if regular is None and (is_regular is None or is_regular(node.z)):
+                regular = node
+            if len(nearest) > 1 and (regular is not None or len(nearest) > MAX_TIED + 1):
+                heap.clear()
             continue
-        found = groups.find_assemblies(stages[len(node.ranks)], node.z)
+        assemblies = groups.find_assemblies(stages[len(node.ranks)], node.z)
         if groups.is_hopeless:
             break
-        for rank, each in enumerate(found):
-            alike = sum(abs(other.distance - each.distance) <= EQUAL_DISTANCE_TOLERANCE for other in found) > 1
+        for rank, part in enumerate(assemblies):
+            alike = sum(abs(other.distance - part.distance) <= EQUAL_DISTANCE_TOLERANCE for other in assemblies) > 1
             heapq.heappush(
                 heap,
                 _Node(
-                    round((node.cost + each.distance) / EQUAL_DISTANCE_TOLERANCE) * EQUAL_DISTANCE_TOLERANCE,
-                    node.slides_behind + each.slides_behind,
+                    round((node.cost + part.distance) / EQUAL_DISTANCE_TOLERANCE) * EQUAL_DISTANCE_TOLERANCE,
+                    node.slides_behind + part.slides_behind,
                     (*node.ranks, rank),
                     next(number),
-                    each.z,
+                    part.z,
                     (*node.ties, len(node.ranks)) if alike else node.ties,
                 ),
             )
-    if chosen is None and not groups.is_hopeless:  # cut off: what is whole already will do
-        chosen = min((node for node in heap if len(node.ranks) == len(stages)), default=None)
-    if chosen is None:
-        failure = groups.last_failure or _failure_beyond(max(heap, key=lambda node: len(node.ranks)), stages)
-        is_cut_off = bool(heap) and not groups.is_hopeless
-        return failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
-    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
+    if not groups.is_hopeless and not nearest:  # cut off: what is whole already will do
+        nearest = sorted(node for node in heap if len(node.ranks) == len(stages))[:1]
+    if nearest:
+        chosen = regular or nearest[0]
+        return Assembly(chosen.z, chosen.ties if len(nearest) > 1 else (), bool(heap))
+    failure = groups.last_failure
+    if failure is None:  # cut off before any block failed
+        farthest = max(heap, key=lambda node: len(node.ranks))
+        failure = AssemblySearchFailure(stages[len(farthest.ranks)], farthest.z)
+    return failure._replace(effort=candidates.effort, is_cut_off=bool(heap) and not groups.is_hopeless)
