@@ -217,6 +217,27 @@ def correct_blocks(functions: EquationFunctions, p: Array, z: Array, u: Array, l
     return z
 
 
+def correct_position(
+    functions: EquationFunctions,
+    position: tuple[Array, Array, Array],
+    free_count: int,
+    rank_tolerance: float,
+    max_steps: int,
+) -> tuple[Array, float]:
+    """The best place near a `position` (z, u, p) of which the first `free_count` of z and u may move, in steps of least
+    squares: unknowns and inputs, and what is open there."""
+    z, u, p = position
+    y, fixed = np.concatenate([z, u]), np.concatenate([z, u])[free_count:]
+
+    def evaluate(free: Array) -> tuple[Array, Array]:
+        y = np.concatenate([free, fixed])
+        residuals, jacobian = functions.residuals_and_jacobian(y[: len(z)], y[len(z) :], p)
+        return residuals, jacobian[:, :free_count]
+
+    free, gap = correct(evaluate, shortest_step(rank_tolerance), y[:free_count], max_steps)
+    return np.concatenate([free, fixed]), gap
+
+
 def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free_count: int) -> Array:
     """A place beside one where the rank falls to this, closed to round-off by its first unknowns, the rest held.
 

@@ -340,7 +340,7 @@ def _remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, links: str
 
 def _search_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
     """A change of one number that lets the block close, or a misfit to accept; `otherwise` where there is neither."""
-    from planar.solving.assembly.least_misfit_offer import offer_least_misfit
+    from planar.solving.assembly.least_misfit import offer_least_misfit
     from planar.solving.diagnosis.remedy import describe_remedy
 
     remedy = describe_remedy(setup, failure, otherwise)

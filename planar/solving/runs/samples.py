@@ -181,7 +181,7 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
     beyond = np.flatnonzero(~passed)
     if not beyond.size:
         return run
-    refusal = misfit_refusal(solver, run.z, run.inputs.u, int(beyond[0]))
+    refusal = misfit_refusal(solver, run.z[beyond[0]], run.inputs.u[beyond[0]])
     assert refusal is not None
     if not beyond[0]:
         raise refusal
