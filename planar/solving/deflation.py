@@ -83,8 +83,8 @@ def _low_rank_block(setup: PreparedMechanism, stage: Block, z: Array, with_earli
             columns |= set().union(*columns_of_row[earlier.rows])
     rows = [row for block in reversed(stages) for row in range(block.rows.start, block.rows.stop)]
     variables = sorted(columns)
-    parts = setup.functions.jacobians(z[None], setup.inputs.u[None], setup.inputs.p)
-    jacobian = np.hstack([part[0] for part in parts])[np.ix_(rows, variables)] / setup.row_scale[rows, None]
+    jacobian = np.asarray(setup.functions.residuals_and_jacobian(z, setup.inputs.u, setup.inputs.p)[1])
+    jacobian = jacobian[np.ix_(rows, variables)] / setup.row_scale[rows, None]
     least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[variables]
     sizes = column_norms(jacobian, least)
     block_rank = rank(jacobian / sizes, MIN_REGULARITY, unit=1.0)

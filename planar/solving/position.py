@@ -115,7 +115,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     solver.refuse_open_contact(stack_motion([w[None], *[0.0 * w[None]] * 2], [u[None], *[0.0 * u[None]] * 2]))
     # what is held to second order only is no freedom: the pairs' own Jacobian does not see it, the deflated one does
     if solver.is_deflated or solver.equations.open_rows:
-        jacobian = np.hstack([part[0] for part in solver.functions.jacobians(z[None], u[None], p)])
+        jacobian = np.asarray(solver.functions.residuals_and_jacobian(z, u, p)[1])
     else:
         jacobian = FullConstraints(solver).jacobian(w)
     mobility = null_space(jacobian).shape[1] if w.size else 0
