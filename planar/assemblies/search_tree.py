@@ -16,7 +16,7 @@ from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.time_limit import stop_if_over
 from planar.model.pairs import MeasureKind
-from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies, is_out_of_reach
+from planar.solving.assembly.block_assemblies import block_dependencies, closed_form_roots
 from planar.solving.newton import CLOSED_TOLERANCE, block_residual_function, one_system, repeat_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -309,7 +309,10 @@ def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool
         left, _ = setup.functions.block_call(stage)(z, setup.inputs.u, setup.inputs.p)
         stands = int(np.abs(left).max(initial=0.0) <= CLOSED_TOLERANCE)
         return _uncertified_roots(np.zeros((stands, 0)), stands, "it stands with the others")
-    known = _linear_roots(setup, stage, z) or _dyad_roots(setup, stage, z)
+    known = _linear_roots(setup, stage, z)
+    if known is None:
+        dyad = closed_form_roots(setup, stage, z)
+        known = None if dyad is None else _uncertified_roots(np.array(dyad).reshape(-1, 2), 2, "in closed form")
     if known is not None and not certify:
         return known
     # positions of dyads alone are told without what larger blocks need
@@ -364,14 +367,3 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
     if np.abs(closing(at)[0]).max() > CLOSED_TOLERANCE:
         return None
     return _uncertified_roots(at[None], 1, "its equations are linear")
-
-
-def _dyad_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
-    """The two assemblies of a block with a closed form, always in the same order; None where they all but meet."""
-    form = setup.functions.block_assemblies(stage)
-    if form is None:
-        return None
-    both, left, bend = form(z, setup.inputs.u, setup.inputs.p)
-    if bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE:
-        return _uncertified_roots(np.array(both), 2, "in closed form")
-    return _uncertified_roots(np.zeros((0, 2)), 2, "in closed form") if is_out_of_reach(bend) else None

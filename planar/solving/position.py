@@ -268,7 +268,7 @@ class PositionSolver(PreparedMechanism):
     def _mobility_or_state(self, z: Array, remarks: tuple[str, ...]) -> int | State:
         """The mobility at a position; where the constraints are singular there the state, if they have rates all the
         same. Raises NoAnswer."""
-        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+        from planar.solving.diagnosis.judgement import SingularPosition, determined_mobility
 
         try:
             return determined_mobility(self, z)
@@ -289,7 +289,7 @@ class PositionSolver(PreparedMechanism):
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
         from planar.solving.diagnosis import refusals
-        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+        from planar.solving.diagnosis.judgement import SingularPosition, determined_mobility
 
         try:
             if residual <= CLOSED_TOLERANCE:

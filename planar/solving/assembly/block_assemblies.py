@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +72,19 @@ def is_out_of_reach(coalescence: Scalar) -> Scalar:
     """Whether a block surely has no assembly, by how near the two of its closed form are to where they meet. Infinity
     says that the form divides by nothing: what holds the block is not known then."""
     return (coalescence > 2.0 - MEETING_COSINE_SQUARED) & (coalescence < np.inf)
+
+
+def closed_form_roots(setup: PreparedMechanism, stage: Block, z: Array) -> Sequence[Array] | None:
+    """The unknowns of the two assemblies of a block in closed form, always in the same order, none where it is out of
+    reach; None where it has no closed form, or the two all but meet."""
+    function = setup.functions.block_assemblies(stage)
+    if function is None:
+        return None
+    roots, residual, coalescence = function(z, setup.inputs.u, setup.inputs.p)
+    if is_out_of_reach(coalescence):
+        return []
+    # what is not a number is not below anything
+    return roots if coalescence < MEETING_COSINE_SQUARED and residual <= CLOSED_TOLERANCE else None
 
 
 class BlockAssemblies:
@@ -175,16 +188,8 @@ class BlockAssemblies:
 
     def _closed_form(self, stage: Block, z: Array) -> list[BlockAssembly] | None:
         """The two assemblies of a block in closed form, none where it is out of reach; None where the form fails."""
-        function = None if self.counts_turns else self.functions.block_assemblies(stage)
-        if function is None:
-            return None
-        roots, residual, coalescence = function(z, self.u, self.p)
-        if is_out_of_reach(coalescence):
-            return []
-        # what is not a number is not below anything
-        if not (coalescence < MEETING_COSINE_SQUARED and residual <= CLOSED_TOLERANCE):
-            return None
-        return self._sorted_assemblies(stage, z, roots)
+        roots = None if self.counts_turns else closed_form_roots(self.setup, stage, z)
+        return None if roots is None else self._sorted_assemblies(stage, z, roots)
 
     def _from_converged(
         self, stage: Block, z: Array, closing: ResidualFunction, ends: NewtonResult
@@ -203,7 +208,7 @@ class BlockAssemblies:
         self._count_effort(STEPS_PER_ROOT * len(roots))
         return self._sorted_assemblies(stage, z, roots)
 
-    def _sorted_assemblies(self, stage: Block, z: Array, roots: list[Array]) -> list[BlockAssembly]:
+    def _sorted_assemblies(self, stage: Block, z: Array, roots: Sequence[Array]) -> list[BlockAssembly]:
         return sorted(
             (self._assembly_of(stage, z, root) for root in roots),
             key=lambda each: (
