@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -96,26 +97,22 @@ class PreparedMechanism:
         self.mechanism = mechanism
         self.shapes = shapes_of_links(mechanism)
         self.functions, self.equations = self.structure.functions, self.structure.equations
-        self.column, self.pairs, self.relative_motions = (
-            self.structure.column,
-            self.structure.pairs,
-            self.structure.relative_motions,
-        )
-        for pair, wrong in pair_misfits(mechanism.pairs, self.shapes, mechanism.units):
-            raise BadInput(pair.name, wrong)
+        self.column, self.pairs = self.structure.column, self.structure.pairs
+        self.relative_motions = self.structure.relative_motions
+        for pair, problem in pair_misfits(mechanism.pairs, self.shapes, mechanism.units):
+            raise BadInput(pair.name, problem)
         for name, shape in self.shapes.items():
-            for point, at in shape.points.items():
-                if not all(value == 0.0 or SMALLEST_NUMBER <= abs(value) < LARGEST_NUMBER for value in at):
-                    told = (
-                        f"a place is 0, or from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:.0e} m, not [{at.x:g}, {at.y:g}]"
-                    )
-                    raise BadInput(f"{name}.{point}", told)
+            for point, place in shape.points.items():
+                if not all(value == 0.0 or SMALLEST_NUMBER <= abs(value) < LARGEST_NUMBER for value in place):
+                    limits = f"from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:.0e} m"
+                    raise BadInput(f"{name}.{point}", f"a place is 0, or {limits}, not [{place.x:g}, {place.y:g}]")
         extents = {name: shape_extent(shape) for name, shape in self.shapes.items()}
         self.unit = size_from_extents(mechanism, extents, self.structure.input_slides)
         self.input_scale = np.where(self.structure.input_slides, self.unit, 1.0)
         "the units of the inputs (inputs,), m or rad"
         self.scale = np.where(self.structure.is_length, self.unit, 1.0)
-        self.reach = {name: each / self.unit for name, each in extents.items()}
+        self.reach = {name: extent / self.unit for name, extent in extents.items()}
+        "the greatest distance between two points of each link (sizes)"
         self.has_extent = any(self.reach.values())
         "whether the unit is a length of some link, and no slide's travel"
         numbers = pair_numbers(mechanism, self.shapes, self.unit)
@@ -130,14 +127,13 @@ class PreparedMechanism:
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
         if not self.keeps_its_numbers(mechanism):
-            there = type(self)(mechanism)
-            there.__dict__["stops"] = self.stops
-            return there.with_functions(self.functions) if self.is_deflated else there
-        there = object.__new__(type(self))
-        there.__dict__.update(self.__dict__)
-        there.mechanism = mechanism
-        there.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
-        return there
+            other = type(self)(mechanism)
+            other.__dict__["stops"] = self.stops
+            return other.with_functions(self.functions) if self.is_deflated else other
+        other = copy(self)
+        other.mechanism = mechanism
+        other.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
+        return other
 
     def keeps_its_numbers(self, mechanism: Mechanism) -> bool:
         """Whether its size and all numbers but the inputs' are those of a mechanism with other inputs, too."""
@@ -145,12 +141,10 @@ class PreparedMechanism:
 
     def with_functions(self, program: EquationFunctions) -> Self:
         """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
-        there = object.__new__(type(self))
-        there.__dict__.update(self.__dict__)
-        for name in ("row_scale", "min_column_scale", "_block_reaches", "acceptance_scales"):
-            there.__dict__.pop(name, None)
-        there.functions, there.equations = program, program.equations
-        return there
+        other = copy(self)
+        other.__dict__.pop("acceptance_scales", None)
+        other.functions, other.equations = program, program.equations
+        return other
 
     @cached_property
     def stops(self) -> PairStops | None:
@@ -177,8 +171,8 @@ class PreparedMechanism:
         """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
         stiffness = dict(self.mechanism.pair_stiffness)
         owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
-        found = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
-        return found / found.max()
+        weights = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
+        return weights / weights.max()
 
     def refuse_misfit(self, what: str) -> None:
         """Raise BadInput where pairs may stay open by a misfit: `what` is told of pairs that close alone."""
@@ -190,11 +184,11 @@ class PreparedMechanism:
     def pair_misfits(self, z: Array, u: Array) -> dict[str, Array]:
         """By how much each pair that may stay open does (samples,): m, angles as arcs at the mechanism's size."""
         w = self.functions.coordinates(z, u, self.inputs.p)
-        found: dict[str, Array] = {}
+        misfits: dict[str, Array] = {}
         for row, column in zip(self.equations.open_rows, self.equations.misfit_columns, strict=True):
             name = self.structure.residual_check.row_pairs[row]
-            found[name] = np.hypot(found.get(name, 0.0), w[:, column] * self.unit)
-        return found
+            misfits[name] = np.hypot(misfits.get(name, 0.0), w[:, column] * self.unit)
+        return misfits
 
     def is_least_misfit(self, z: Array, u: Array) -> Array:
         """At which stationary positions (samples,) the misfit is the least of all beside: whether its second derivative
@@ -236,40 +230,32 @@ class PreparedMechanism:
 
     @cached_property
     def acceptance_scales(self) -> Scales:
-        """The numbers by which positions are judged."""
-        return Scales(self.inputs.p, self.row_scale, self.min_column_scale)
-
-    @cached_property
-    def row_scale(self) -> Array:
-        """What every row of a Jacobian is divided by (rows,): lengths by the reach of their block."""
+        """The numbers by which positions are judged, with `row_scale` and `min_column_scale`."""
         e = self.equations
-        by = np.ones(len(e.rows))
-        for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
-            by[stage.rows] = [reach if row.kind is MeasureKind.LENGTH else 1.0 for row in e.rows[stage.rows]]
-        return by
+        row_scale, min_column_scale = np.ones(len(e.rows)), np.ones(len(e.unknowns))
+        for block in e.blocks:
+            # of links that have but one point each, the least extent of a link beside
+            beside = (self.reach[link] for pair in block.pairs for link in self.pairs[pair].links)
+            reach = max((self.reach[link] for link in block.links), default=0.0) or min(
+                filter(None, beside), default=1.0
+            )
+            row_scale[block.rows] = [reach if row.kind is MeasureKind.LENGTH else 1.0 for row in e.rows[block.rows]]
+            coordinates = (e.coordinates[column] for column in e.unknowns[block.unknowns])
+            min_column_scale[block.unknowns] = [
+                1.0 / reach if c.kind is MeasureKind.LENGTH else self.reach.get(c.owner, reach) / reach or 1.0
+                for c in coordinates
+            ]
+        return Scales(self.inputs.p, row_scale, min_column_scale)
 
-    @cached_property
+    @property
+    def row_scale(self) -> Array:
+        """What every row of a Jacobian is divided by (rows,): lengths by the reach of their block's links (sizes)."""
+        return self.acceptance_scales.row_scale
+
+    @property
     def min_column_scale(self) -> Array:
         """What the column of every unknown could be at best in its block, rows divided so (unknowns,)."""
-        e = self.equations
-        least = np.ones(len(e.unknowns))
-        for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
-            own = [e.coordinates[column] for column in e.unknowns[stage.unknowns]]
-            least[stage.unknowns] = [
-                1.0 / reach if c.kind is MeasureKind.LENGTH else self.reach.get(c.owner, reach) / reach or 1.0
-                for c in own
-            ]
-        return least
-
-    @cached_property
-    def _block_reaches(self) -> list[float]:
-        """The reach of every block's links (sizes); where they have but one point each, of the least link beside."""
-        found = []
-        for stage in self.equations.blocks:
-            own = max((self.reach[link] for link in stage.links), default=0.0)
-            beside = (self.reach[link] for pair in stage.pairs for link in self.pairs[pair].links)
-            found.append(own or min((reach for reach in beside if reach > 0.0), default=1.0))
-        return found
+        return self.acceptance_scales.column_floor
 
     @property
     def row_pairs(self) -> list[str]:

@@ -65,28 +65,20 @@ class PairStops:
         self, shapes: Mapping[str, LinkShape], frames: Mapping[str, Frame], own: Mapping[str, Sequence[Any]]
     ) -> Array:
         """The positions of the pairs that have stops (stops,); (stops, rows) where frames are arrays."""
-        found = [value_and_rates(pair.input_position_at(shapes, frames, own))[0] for pair in self.pairs]
-        return np.array(np.broadcast_arrays(*found), dtype=float)
+        positions = [value_and_rates(pair.input_position_at(shapes, frames, own))[0] for pair in self.pairs]
+        return np.array(np.broadcast_arrays(*positions), dtype=float)
 
     def turns(self, positions: Array) -> Array:
         """Whole turns (rad) to add to positions (stops,) so that they lie between their stops; as few as can be, or
         those of the mechanism's own assembly where these do."""
-        found = np.zeros(len(positions))
-        for k in np.flatnonzero(self.is_periodic):
-            room, kept = STOP_TOLERANCE, None if self.initial_turns is None else float(self.initial_turns[k])
-            low, high, at = self.low[k] - room, self.high[k] + room, float(positions[k])
-            if kept is not None and low <= at + kept <= high:
-                found[k] = kept
-                continue
-            if at < low:
-                more = TURN * np.ceil((low - at) / TURN)
-            elif at > high:
-                more = -TURN * np.ceil((at - high) / TURN)
-            else:
-                continue
-            if low <= at + more <= high:
-                found[k] = more
-        return found
+        low, high = self.low - STOP_TOLERANCE, self.high + STOP_TOLERANCE
+        up, down = TURN * np.ceil((low - positions) / TURN), TURN * np.ceil((positions - high) / TURN)
+        turns: Array = np.zeros(len(positions))
+        for choice in (np.where(positions < low, up, np.where(positions > high, -down, 0.0)), self.initial_turns):
+            if choice is not None:
+                is_inside = (low <= positions + choice) & (positions + choice <= high)
+                turns = np.where(self.is_periodic & is_inside, choice, turns)
+        return turns
 
     def rooms(self, positions: Array, turns: Array | None = None) -> Array:
         """How far positions (stops,) are from their lower and upper stops (2, stops), rad or sizes; negative beyond."""
@@ -99,15 +91,14 @@ class PairStops:
         Between two rows a smooth motion leaves the stretch between them by an eighth of its second difference; eight
         times that is allowed for, and rows that are far apart are not judged.
         """
-        many = positions.shape[1]
-        if many < MIN_SURE_ROWS:
-            return np.zeros(many, dtype=bool)
-        at = (positions + self.turns(positions[:, 0])[:, None]) / self.scale[:, None]
-        low, high = (each[:, None] / self.scale[:, None] for each in (self.low, self.high))
-        room = np.minimum(at - low, high - at)
-        bend = np.abs(np.diff(at, 2, axis=1))
-        beside = np.pad(bend, ((0, 0), (1, 1)), mode="edge")
-        steps = np.maximum(beside[:, :-1], beside[:, 1:])
+        row_count = positions.shape[1]
+        if row_count < MIN_SURE_ROWS:
+            return np.zeros(row_count, dtype=bool)
+        scaled = (positions + self.turns(positions[:, 0])[:, None]) / self.scale[:, None]
+        low, high = ((limit / self.scale)[:, None] for limit in (self.low, self.high))
+        room = np.minimum(scaled - low, high - scaled)
+        second_differences = np.pad(np.abs(np.diff(scaled, 2, axis=1)), ((0, 0), (1, 1)), mode="edge")
+        steps = np.maximum(second_differences[:, :-1], second_differences[:, 1:])
         clear = np.minimum(room[:, :-1], room[:, 1:]) > steps + STOP_TOLERANCE
         near = np.abs(np.diff(z, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
         return np.append(room[:, 0].min() > STOP_TOLERANCE, clear.all(axis=0) & near)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceFunctions, acceptance_functions
-from planar.equations.coordinates import coordinate_columns
+from planar.equations.coordinates import FRAME_PARTS, coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Link, Point
@@ -26,12 +26,11 @@ from planar.solving.checks.residual_check import ResidualCheck
 
 
 class PointLocations(NamedTuple):
-    """Where named points are found: each by the first of its links to be placed, (block, link, point), and the points
-    of each link with their names; `level` is the block after which each link stands, -1 where inputs alone say so."""
+    """The places of named points: each by the first of its links to be placed, (block, link, point), and the points of
+    each link with their names. The block is that after which the link stands, -1 where inputs alone place it."""
 
     first_link: dict[str, tuple[int, str, str]]
     points_of: dict[str, list[tuple[str, str]]]
-    level: dict[str, int]
 
 
 class MechanismStructure:
@@ -51,14 +50,11 @@ class MechanismStructure:
         )
         self.counts = bool(links_counting_turns(mechanism))
 
-    @property
+    @cached_property
     def acceptance(self) -> AcceptanceFunctions | None:
         """What computes and judges positions block after block, for the structures that have it."""
-        return self._acceptance if self._acceptance.is_available else None
-
-    @cached_property
-    def _acceptance(self) -> AcceptanceFunctions:
-        return acceptance_functions(self.mechanism)
+        functions = acceptance_functions(self.mechanism)
+        return functions if functions.is_available else None
 
     @cached_property
     def residual_check(self) -> ResidualCheck:
@@ -67,20 +63,18 @@ class MechanismStructure:
 
     @cached_property
     def point_locations(self) -> PointLocations:
-        """Where named points are found."""
-        links = self.mechanism.links
-        level = {link.name: self._link_level(link.name) for link in links}
+        """The places of named points."""
+        names = [link.name for link in self.mechanism.links]
+        known_after = self.equations.known_after_block
+        columns = {link: [self.column.get((link, part)) for part in FRAME_PARTS] for link in names}
+        blocks = {link: max((known_after[c] for c in columns[link] if c is not None), default=-1) for link in names}
         first: dict[str, tuple[int, str, str]] = {}
-        points_of: dict[str, list[tuple[str, str]]] = {link.name: [] for link in links}
-        for each in named_points(self.mechanism):
-            first[each.name] = min((level[link], link, point) for link, point in each.members)
-            for link, point in each.members:
-                points_of[link].append((point, each.name))
-        return PointLocations(first, points_of, level)
-
-    def _link_level(self, link: str) -> int:
-        columns = [self.column.get((link, part)) for part in ("x", "y", "angle")]
-        return max((self.equations.known_after_block[c] for c in columns if c is not None), default=-1)
+        points_of: dict[str, list[tuple[str, str]]] = {link: [] for link in names}
+        for named in named_points(self.mechanism):
+            first[named.name] = min((blocks[link], link, point) for link, point in named.members)
+            for link, point in named.members:
+                points_of[link].append((point, named.name))
+        return PointLocations(first, points_of)
 
 
 def mechanism_structure(mechanism: Mechanism) -> MechanismStructure:

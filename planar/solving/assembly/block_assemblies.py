@@ -112,7 +112,7 @@ class BlockAssemblies:
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
         self.counts_turns = setup.structure.counts
         # each point by the first of its links to be placed, and the points of each link
-        self.first_link, self.points_of, _ = setup.structure.point_locations
+        self.first_link, self.points_of = setup.structure.point_locations
         self.sketched_by_level: dict[int, list[str]] = {}
         for name in self.sketch:
             self.sketched_by_level.setdefault(self.first_link[name][0], []).append(name)
