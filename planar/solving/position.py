@@ -15,6 +15,7 @@ from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
 from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
+from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, with_unit_rate
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
@@ -33,10 +34,18 @@ from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
+    from planar.solving.assembly import least_misfit
     from planar.solving.continuation.path_pieces import BranchRates
     from planar.solving.continuation.singular_rates import SingularRates
     from planar.solving.continuation.solution_curve import CurvePoint
-    from planar.solving.rates.sample_rates import InputRates
+    from planar.solving.diagnosis import judgement, refusals
+    from planar.solving.rates import regularity, sample_rates
+else:  # few positions need them
+    least_misfit = LazyModule("planar.solving.assembly.least_misfit")
+    judgement = LazyModule("planar.solving.diagnosis.judgement")
+    refusals = LazyModule("planar.solving.diagnosis.refusals")
+    regularity = LazyModule("planar.solving.rates.regularity")
+    sample_rates = LazyModule("planar.solving.rates.sample_rates")
 
 
 @takes_mechanism
@@ -108,8 +117,6 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     u, p = solver.inputs.u, solver.inputs.p
     residual, pair = solver.worst_residual(z)
     if residual > solver.tolerance:
-        from planar.solving.diagnosis import refusals
-
         raise refusals.not_closed(solver, pair, residual)
     w = solver.functions.coordinates(z, u, p)
     solver.refuse_open_contact(stack_motion([w[None], *[0.0 * w[None]] * 2], [u[None], *[0.0 * u[None]] * 2]))
@@ -143,8 +150,6 @@ class PositionSolver(PreparedMechanism):
     def nearest(self) -> Assembly | AssemblySearchFailure:
         """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
         if any(stage.is_free for stage in self.equations.blocks):
-            from planar.solving.diagnosis import refusals
-
             raise refusals.free_links(self)
         if self.equations.open_rows:
             return self._nearest_least_misfit()
@@ -152,13 +157,11 @@ class PositionSolver(PreparedMechanism):
 
     def _nearest_least_misfit(self) -> Assembly:
         """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
-        from planar.solving.assembly.least_misfit import find_least_misfit, refuse_misfit  # few mechanisms have one
-
         exact = PositionSolver(replace(self.mechanism, closes_within=None))
-        assembly = find_least_misfit(self, exact, exact._is_regular)
+        assembly = least_misfit.find_least_misfit(self, exact, exact._is_regular)
         if isinstance(assembly, AssemblySearchFailure):
             raise exact.unassembled(assembly)
-        refuse_misfit(self, assembly.z, self.inputs.u)
+        least_misfit.refuse_misfit(self, assembly.z, self.inputs.u)
         return assembly
 
     def remarks(self, assembly: Assembly) -> tuple[str, ...]:
@@ -167,9 +170,7 @@ class PositionSolver(PreparedMechanism):
 
     def block_regularity(self, z: Array) -> Array:
         """How regular the Jacobian of each block is at unknowns z (blocks,)."""
-        from planar.solving.rates.regularity import jacobian_at, regularity
-
-        return regularity(self, jacobian_at(self, z, self.inputs.u))
+        return regularity.regularity(self, regularity.jacobian_at(self, z, self.inputs.u))
 
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
@@ -196,13 +197,11 @@ class PositionSolver(PreparedMechanism):
 
     def unassembled(self, failure: AssemblySearchFailure) -> NoAnswer:
         """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.rates.regularity import is_always_singular
-
-        regularity = self.block_regularity(failure.z)
+        block_regularity = self.block_regularity(failure.z)
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
-            if regularity[stage.block_index] < MIN_REGULARITY and is_always_singular(self, stage, failure.z):
+            is_weak = block_regularity[stage.block_index] < MIN_REGULARITY
+            if is_weak and regularity.is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
         if self._is_contradicted(failure):
             return refusals.too_many_inputs(self)
@@ -242,22 +241,18 @@ class PositionSolver(PreparedMechanism):
 
     def _examined_state(self, z: Array, remarks: tuple[str, ...]) -> State:
         """The state by the general checks, which say why where there is none."""
-        from planar.solving.rates.sample_rates import sample_rates
-
         residual, pair = self.worst_residual(z)
         if residual > self.tolerance:
             raise self._open_refusal(z, residual, pair)
         if self.equations.open_rows:
-            from planar.solving.assembly.least_misfit import refuse_misfit
-
-            refuse_misfit(self, z, self.inputs.u)
+            least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
         if not (self.functions.is_square and self._is_regular(z)):
             mobility_or_state = self._mobility_or_state(z, remarks)
             if isinstance(mobility_or_state, State):
                 return mobility_or_state
             mobility = mobility_or_state
-        rates = sample_rates(self, z[None], self._one_sample(), {}, False)
+        rates = sample_rates.sample_rates(self, z[None], self._one_sample(), {}, False)
         doubt = rates.doubts
         if doubt is not None and doubt.errors.is_too_inexact[0]:
             raise doubt.refusal(self, 0, self.describe_position())
@@ -268,15 +263,13 @@ class PositionSolver(PreparedMechanism):
     def _mobility_or_state(self, z: Array, remarks: tuple[str, ...]) -> int | State:
         """The mobility at a position; where the constraints are singular there the state, if they have rates all the
         same. Raises NoAnswer."""
-        from planar.solving.diagnosis.judgement import SingularPosition, determined_mobility
-
         try:
-            return determined_mobility(self, z)
-        except (SingularPosition, NoAnswer) as problem:
+            return judgement.determined_mobility(self, z)
+        except (judgement.SingularPosition, NoAnswer) as problem:
             regular = self.regularized(z)
             if regular is not None:
                 return regular[0].state(regular[1], remarks)
-            if not isinstance(problem, SingularPosition):
+            if not isinstance(problem, judgement.SingularPosition):
                 raise
             from planar.solving.continuation.singular_rates import singular_rates  # few positions are of this kind
 
@@ -288,23 +281,18 @@ class PositionSolver(PreparedMechanism):
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.diagnosis.judgement import SingularPosition, determined_mobility
-
         try:
             if residual <= CLOSED_TOLERANCE:
-                determined_mobility(self, z)
-        except SingularPosition as singular:
+                judgement.determined_mobility(self, z)
+        except judgement.SingularPosition as singular:
             return singular.refusal()
         except NoAnswer as singular:
             return singular
         return refusals.not_closed(self, pair, residual)
 
-    def _one_sample(self) -> InputRates:
-        from planar.solving.rates.sample_rates import InputRates
-
+    def _one_sample(self) -> sample_rates.InputRates:
         s = self.inputs
-        return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
+        return sample_rates.InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
         """The state of a position that is surely sound, of a mechanism that may have other inputs."""
@@ -313,13 +301,12 @@ class PositionSolver(PreparedMechanism):
 
     def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
         """What to say of a motion that ends at inputs u, and went as far as a point."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.rates.regularity import moved_links
-
         if ending is TrackingEnd.STOP and self.stops is not None:
             met = self.stops.describe_met(self.stop_positions(point.y[:-1], u))
             return refusals.motion_stopped(self, met, self.describe_inputs(u))
-        return refusals.motion_ended(self, moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending)
+        return refusals.motion_ended(
+            self, regularity.moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending
+        )
 
     def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
         """The state where more than the inputs could move to first order, but only one motion goes on."""
@@ -337,10 +324,8 @@ class PositionSolver(PreparedMechanism):
 
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
-        from planar.solving.rates.sample_rates import sample_rates
-
         residual = self.max_residual(z, self.inputs.u)
-        samples = sample_rates(self, z[None], self._one_sample(), {0: local}, False)
+        samples = sample_rates.sample_rates(self, z[None], self._one_sample(), {0: local}, False)
         rates = [part[0] for part in samples.coordinate_rates]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
@@ -355,8 +340,6 @@ class PositionSolver(PreparedMechanism):
         """Raise NoAnswer where a contact is open that guides should keep closed; `motion` as of `stack_motion`."""
         contact = self.structure.residual_check.find_open_contact(motion, self.inputs.p)
         if contact is not None:
-            from planar.solving.diagnosis import refusals
-
             pair, gap = contact
             raise refusals.open_contact(self, pair, gap * self.unit)
 
@@ -367,8 +350,6 @@ class PositionSolver(PreparedMechanism):
         gaps = self.structure.residual_check.rate_residuals(motion, self.inputs.p)
         for ((gap,), pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
             if gap > 1e3 * self.tolerance:
-                from planar.solving.diagnosis import refusals
-
                 if self.inputs.u.size > mobility:
                     raise refusals.disagreeing_inputs(self, mobility, what)
                 raise refusals.broken_rates(self, what, pair, float(gap))
@@ -488,9 +469,7 @@ class SolvedMechanism:
     def _judgement(self, pair: str | None) -> NoAnswer | None:
         """Why an input of this mechanism at rest cannot run; None where one can."""
         if pair not in self._judgements:
-            from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
-
-            self._judgements[pair] = judge_motion(self.solver, self.assembly.z, pair)
+            self._judgements[pair] = judgement.judge_motion(self.solver, self.assembly.z, pair)
         return self._judgements[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:

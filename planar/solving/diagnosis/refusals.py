@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.errors import join_names as several
+from planar.foundation.lazy_module import LazyModule
 from planar.foundation.time_limit import time_is_over
 from planar.model.mechanism import unjoined_points
 from planar.model.pairs import MeasureKind, joining_entry_text
@@ -21,6 +23,11 @@ from planar.model.wording import amount, count_phrase, join_all_names, quote_nam
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
+
+if TYPE_CHECKING:
+    from planar.solving.diagnosis import redundancy
+else:  # what finds causes is loaded only when something is refused
+    redundancy = LazyModule("planar.solving.diagnosis.redundancy")
 
 MAX_BRANCHES_LISTED = 4
 """Branches that are listed one by one."""
@@ -122,9 +129,7 @@ def always_free(setup: PreparedMechanism, links: Sequence[str], w: Array | None 
 
 def jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free; w as for `always_free`."""
-    from planar.solving.diagnosis.redundancy import find_jammed_inputs
-
-    jam = find_jammed_inputs(setup, w)
+    jam = redundancy.find_jammed_inputs(setup, w)
     if jam is None:
         return None
     names, links = jam
@@ -153,10 +158,8 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
 
 def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     """What to remove from a structure: its inputs, or what lets it move."""
-    from planar.solving.diagnosis.redundancy import releasing_parts
-
     mechanism = setup.mechanism
-    link, pairs = releasing_parts(setup, w)
+    link, pairs = redundancy.releasing_parts(setup, w)
     removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
     if link is not None:
         removal = f"link {link!r} with its {removal}"
@@ -349,17 +352,13 @@ def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:
 
 def _surplus_inputs(setup: PreparedMechanism) -> str:
     """What to say of inputs that move one another while other links are free."""
-    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
-
-    sets = find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
+    sets = redundancy.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
     return f", and leave one out of those at {quote_names(sets[0])}, which move one another" if sets else ""
 
 
 def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     """Which inputs conflict, and what to do about it."""
-    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
-
-    sets = find_conflicting_inputs(setup)
+    sets = redundancy.find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
     told = [
