@@ -63,7 +63,7 @@ class NewtonResult(NamedTuple):
 
     def joined(self, other: NewtonResult) -> NewtonResult:
         """The ends of the starts of both."""
-        unknowns, residual, converged = (np.concatenate(both) for both in zip(self[:3], other[:3], strict=True))
+        unknowns, residual, converged = (np.concatenate(parts) for parts in zip(self[:3], other[:3], strict=True))
         return NewtonResult(unknowns, residual, converged, self.steps + other.steps)
 
 
@@ -169,12 +169,8 @@ def polish_root(residual_function: ResidualFunction, z: Array) -> Array:
     """One root (n,) of a block carried to round-off."""
     if not z.size:
         return z
-    undamped = np.zeros(1)
-
-    def step(jacobian: Array, residuals: Array) -> Array:
-        return _damped_step(residuals[None], jacobian[None], undamped)[0]
-
-    return correct(one_system(residual_function), step, z, MAX_POLISHING_STEPS)[0]
+    system = one_system(residual_function)
+    return correct(system, lambda j, r: _damped_step(r[None], j[None], np.zeros(1))[0], z, MAX_POLISHING_STEPS)[0]
 
 
 def one_system(residual_function: ResidualFunction) -> SystemFunction:
@@ -269,12 +265,12 @@ def refine_multiple_root(residual_function: ResidualFunction, root: Array, longe
     A step along what is all but open bends away before the next one brings it nearer, so none is refused; one that is
     longer than `longest_step` leads elsewhere.
     """
-    best, least = root, np.inf
+    best, minimum = root, np.inf
     for _ in range(MAX_MULTIPLE_ROOT_STEPS):
         residuals, jacobian = residual_function(root[None])
         gap = float(np.abs(residuals).max())
-        if gap < least:
-            best, least = root, gap
+        if gap < minimum:
+            best, minimum = root, gap
         step = np.linalg.pinv(jacobian[0], rcond=MULTIPLE_ROOT_RANK_TOLERANCE) @ residuals[0]
         if not EPS < np.abs(step).max() < longest_step:
             break

@@ -128,14 +128,14 @@ class PairStops:
         kind = self.pairs[k].input_quantity_kinds()[0]
         low, high = (amount(float(each), kind, units) for each in (self.low[k], self.high[k]))
         if not np.isfinite(self.low[k]):
-            allowed, way = f"its stop at {high}", "above"
+            allowed, side = f"its stop at {high}", "above"
         elif not np.isfinite(self.high[k]):
-            allowed, way = f"its stop at {low}", "below"
+            allowed, side = f"its stop at {low}", "below"
         else:
-            allowed, way = f"its stops at {low} and {high}", "outside of"
-        name, at = self.pairs[k].name, amount(float(positions[k]), kind, units)
+            allowed, side = f"its stops at {low} and {high}", "outside of"
+        name, position = self.pairs[k].name, amount(float(positions[k]), kind, units)
         return NoAnswer(
             Outcome.STOP,
-            f"{where} pair {name!r} is at {at}, {way} {allowed}; move the input, let the sketch choose another "
+            f"{where} pair {name!r} is at {position}, {side} {allowed}; move the input, let the sketch choose another "
             f"assembly, or move the stop",
         )

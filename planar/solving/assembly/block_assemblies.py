@@ -313,6 +313,6 @@ def _spread_angles(unknowns: int) -> Array:
     for _ in range(40):
         root = (1.0 + root) ** (1.0 / (unknowns + 1))
     steps = (1.0 / root) ** np.arange(1, unknowns + 1)
-    many = min(6 * unknowns**2, MAX_STARTS) or 1
-    spread = np.arange(many)[:, None] * steps % 1.0
+    count = min(6 * unknowns**2, MAX_STARTS) or 1
+    spread = np.arange(count)[:, None] * steps % 1.0
     return 2.0 * np.pi * np.where(spread > 0.5, spread - 1.0, spread)

@@ -63,8 +63,8 @@ class _BlockSearch:
         if self._is_dead_end(z, stage.unknowns.start):
             return []
         is_farthest = self.last_failure is None or stage.block_index > self.last_failure.stage.block_index
-        found, nearest = self.candidates.near_sketch(stage, z, needs_nearest=is_farthest)
-        if not found:
+        assemblies, nearest = self.candidates.near_sketch(stage, z, needs_nearest=is_farthest)
+        if not assemblies:
             if is_farthest:
                 self.last_failure = AssemblySearchFailure(stage, nearest)
             self._dependencies = self._dependencies or [
@@ -72,12 +72,14 @@ class _BlockSearch:
             ]
             self._dead_ends.setdefault(stage.block_index, set()).add(z[self._dependencies[stage.block_index]].tobytes())
             self.is_hopeless = not self._dependencies[stage.block_index]
-        return found
+        return assemblies
 
     def _is_dead_end(self, z: Array, known: int) -> bool:
         columns = self._dependencies or []
-        ends = self._dead_ends.items()
-        return any(columns[level][-1] < known and z[columns[level]].tobytes() in places for level, places in ends)
+        return any(
+            columns[level][-1] < known and z[columns[level]].tobytes() in places
+            for level, places in self._dead_ends.items()
+        )
 
 
 class _Node(NamedTuple):

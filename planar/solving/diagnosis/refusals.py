@@ -361,12 +361,12 @@ def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     sets = redundancy.find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
-    told = [
+    clauses = [
         f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quote_names(each)} move one another"
         for each in sets[:3]
     ]
     which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
-    return f": {join_all_names(told)}; leave {which} out"
+    return f": {join_all_names(clauses)}; leave {which} out"
 
 
 def disagreeing_inputs(setup: PreparedMechanism, mobility: int, what: str) -> NoAnswer:
