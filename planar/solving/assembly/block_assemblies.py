@@ -56,9 +56,9 @@ def block_dependencies(setup: PreparedMechanism) -> list[frozenset[int]]:
 class BlockAssembly(NamedTuple):
     """One assembly of a block: all unknowns with this block's filled in, and how it lies.
 
-    `distance`: squared distance to the sketch of the points that the block places (sizes squared); `behind`: how many
-    slides are not ahead of their `through`; `height`: mean y of the block's points; `far`: how far its slides are ahead
-    together.
+    `distance`: squared distance to the sketch of the points that the block places (sizes squared); `slides_behind`: how
+    many slides are not ahead of their `through`; `height`: mean y of the block's points; `slides_ahead`: how far its
+    slides are ahead together.
     """
 
     z: Array
