@@ -36,7 +36,6 @@ from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 if TYPE_CHECKING:
     from planar.solving.assembly import least_misfit
     from planar.solving.continuation.path_pieces import BranchRates
-    from planar.solving.continuation.singular_rates import SingularRates
     from planar.solving.continuation.solution_curve import CurvePoint
     from planar.solving.diagnosis import judgement, refusals
     from planar.solving.rates import regularity, sample_rates
@@ -248,51 +247,32 @@ class PositionSolver(PreparedMechanism):
             least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
         if not (self.functions.is_square and self._is_regular(z)):
-            mobility_or_state = self._mobility_or_state(z, remarks)
-            if isinstance(mobility_or_state, State):
-                return mobility_or_state
-            mobility = mobility_or_state
-        rates = sample_rates.sample_rates(self, z[None], self._one_sample(), {}, False)
-        doubt = rates.doubts
+            mobility, refuse = judgement.judge_velocity(self, z)
+            regular = None if refuse is None else self.regularized(z)
+            if regular is not None:
+                return regular[0].state(regular[1], remarks)
+            if refuse is not None:
+                state = self._singular_state(z, remarks) if mobility == self.inputs.u.size + 1 else None
+                if state is None:
+                    raise refuse()
+                return state
+        coordinate_rates, doubt = self._sample_rates(z, {})
         if doubt is not None and doubt.errors.is_too_inexact[0]:
             raise doubt.refusal(self, 0, self.describe_position())
         if doubt is not None:
             remarks = (*remarks, doubt.remark())
-        return self._checked_state([part[0] for part in rates.coordinate_rates], mobility, residual, remarks)
-
-    def _mobility_or_state(self, z: Array, remarks: tuple[str, ...]) -> int | State:
-        """The mobility at a position; where the constraints are singular there the state, if they have rates all the
-        same. Raises NoAnswer."""
-        try:
-            return judgement.determined_mobility(self, z)
-        except (judgement.SingularPosition, NoAnswer) as problem:
-            regular = self.regularized(z)
-            if regular is not None:
-                return regular[0].state(regular[1], remarks)
-            if not isinstance(problem, judgement.SingularPosition):
-                raise
-            from planar.solving.continuation.singular_rates import singular_rates  # few positions are of this kind
-
-            through = singular_rates(self, z)
-            state = through and self._singular_state(through, remarks)
-            if state is None:
-                raise problem.refusal() from None
-            return state
+        return self._checked_state([rates[0] for rates in coordinate_rates], mobility, residual, remarks)
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        try:
-            if residual <= CLOSED_TOLERANCE:
-                judgement.determined_mobility(self, z)
-        except judgement.SingularPosition as singular:
-            return singular.refusal()
-        except NoAnswer as singular:
-            return singular
-        return refusals.not_closed(self, pair, residual)
+        refuse = judgement.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
+        return refusals.not_closed(self, pair, residual) if refuse is None else refuse()
 
-    def _one_sample(self) -> sample_rates.InputRates:
-        s = self.inputs
-        return sample_rates.InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
+    def _sample_rates(self, z: Array, branch_rates: Mapping[int, BranchRates]) -> sample_rates.SampleRates:
+        """The rates at one sample."""
+        u, u1, u2 = (rates[None] for rates in self.inputs[:3])
+        inputs = sample_rates.InputRates(u, u1, u2, 0.0 * u)
+        return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
         """The state of a position that is surely sound, of a mechanism that may have other inputs."""
@@ -308,11 +288,12 @@ class PositionSolver(PreparedMechanism):
             self, regularity.moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending
         )
 
-    def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
-        """The state where more than the inputs could move to first order, but only one motion goes on."""
-        s = self.inputs
-        residual = self.max_residual(rates.z, s.u)
-        if residual > self.tolerance:
+    def _singular_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
+        """The state where one more than the inputs could move to first order, if only one motion goes on."""
+        from planar.solving.continuation.singular_rates import singular_rates  # few positions are of this kind
+
+        s, rates = self.inputs, singular_rates(self, z)
+        if rates is None or (residual := self.max_residual(rates.z, s.u)) > self.tolerance:
             return None
         y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
         note = "to first order there is one more motion here; the rates are those of the only one that goes on"
@@ -325,8 +306,7 @@ class PositionSolver(PreparedMechanism):
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
         residual = self.max_residual(z, self.inputs.u)
-        samples = sample_rates.sample_rates(self, z[None], self._one_sample(), {0: local}, False)
-        rates = [part[0] for part in samples.coordinate_rates]
+        rates = [part[0] for part in self._sample_rates(z, {0: local}).coordinate_rates]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
         return self._checked_state(rates, self.inputs.u.size, residual, ())
@@ -363,7 +343,8 @@ class SolvedMechanism:
     def __init__(self, mechanism: Mechanism):
         self.plain_solver = PositionSolver(mechanism)
         "by the constraints of the pairs alone"
-        self._judgements: dict[str | None, NoAnswer | None] = {}
+        self._refusals_at_rest: dict[str | None, NoAnswer | None] = {}
+        "of a mechanism without rates: why the input at a pair cannot run"
         self.range_ends: dict[Any, Any] = {}
         "the ends of the ranges of its inputs"
 
@@ -457,20 +438,11 @@ class SolvedMechanism:
             return None  # regular positions need no judgement
         inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
         # rates, loads and remarks make no difference to the judgement, nor to the assembly
-        at_rest = solved_mechanism(replace(mechanism, inputs=inputs, remarks=(), loads=()))
-        at_rest._share_start(self)
-        return at_rest._judgement(pair)
-
-    def _share_start(self, other: SolvedMechanism) -> None:
-        """Take the start of the same mechanism with other rates, where this one has none yet."""
-        if "_start" not in self.__dict__:
-            self.__dict__["_start"] = other.solver.with_inputs_of(self.plain_solver.mechanism), other._start[1]
-
-    def _judgement(self, pair: str | None) -> NoAnswer | None:
-        """Why an input of this mechanism at rest cannot run; None where one can."""
-        if pair not in self._judgements:
-            self._judgements[pair] = judgement.judge_motion(self.solver, self.assembly.z, pair)
-        return self._judgements[pair]
+        at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
+        refusals_at_rest = solved_mechanism(at_rest)._refusals_at_rest
+        if pair not in refusals_at_rest:
+            refusals_at_rest[pair] = judgement.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
+        return refusals_at_rest[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
         """What to say where rates are not determined since nothing can move; None where something can."""

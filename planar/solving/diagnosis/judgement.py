@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -42,40 +43,31 @@ def judge_motion(setup: PreparedMechanism, z: Array, pair: str | None = None) ->
     return None
 
 
-class SingularPosition(Exception):
-    """A position with one freedom more than inputs, to first order; `refusal` says what to say if it is so in truth."""
+def judge_velocity(setup: PreparedMechanism, z: Array) -> tuple[int, Callable[[], NoAnswer] | None]:
+    """The mobility at a position, and what computes the refusal where the inputs do not determine the velocity there or
+    contradict one another; None where they do determine it.
 
-    def __init__(self, refused: Callable[[], NoAnswer]):
-        super().__init__()
-        self.refusal = refused
-
-
-def determined_mobility(setup: PreparedMechanism, z: Array) -> int:
-    """The mobility at a position; raises NoAnswer where the velocity is not determined, or contradicted.
-
-    Raises SingularPosition where the next orders have to tell whether it is determined.
+    With one freedom more than inputs it is so to first order: the next orders tell whether it is in truth.
     """
     s, rest = setup.inputs, np.zeros_like(z)
-    inputs = s.u.size
     # the unknowns rest while the inputs move
     y, y1, y2 = (np.concatenate(parts) for parts in ((z, s.u), (rest, s.u1), (rest, s.u2)))
     motion = setup.functions.kinematics(y, y1, y2, s.p)
     mobility, weak = freedom_by_rank(setup, motion)
     if not weak:
-        if mobility < inputs and not input_rates_agree(setup, motion):
-            raise refusals.disagreeing_inputs(setup, mobility, "velocities")
-        return mobility
-    links = links_free_at_rest(setup, motion.jacobian) or list(
-        dict.fromkeys(link for block in weak for link in block.links)
-    )
-    if mobility <= inputs:
-        raise refusals.dead_point(setup, links)
+        if mobility < s.u.size and not input_rates_agree(setup, motion):
+            return mobility, partial(refusals.disagreeing_inputs, setup, mobility, "velocities")
+        return mobility, None
 
-    def refused() -> NoAnswer:
+    def refuse() -> NoAnswer:
+        links = links_free_at_rest(setup, motion.jacobian)
+        links = links or list(dict.fromkeys(link for block in weak for link in block.links))
+        if mobility <= s.u.size:
+            return refusals.dead_point(setup, links)
         count = count_motions(setup, motion.w)
-        always = any(is_always_singular(setup, block, z) for block in weak) if count is None else count > inputs
+        always = any(is_always_singular(setup, block, z) for block in weak) if count is None else count > s.u.size
         if always:
             return refusals.always_free(setup, links, motion.w)
         return refusals.change_point(setup, links, mobility, z)
 
-    raise SingularPosition(refused) if mobility == inputs + 1 else refused()
+    return mobility, refuse
