@@ -416,7 +416,7 @@ class PreparedMechanism:
     def describe_inputs(self, u: Array) -> str:
         """A position of the inputs in words: A = 60 deg."""
         return several(
-            [self.describe_input(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)]
+            [self.describe_input(given.pair, value) for given, value in zip(self.mechanism.inputs, u, strict=True)]
         )
 
     def describe_input(self, pair: str, position: float) -> str:

@@ -47,9 +47,9 @@ class PairStops:
         motions = relative_motions(mechanism)
         counting = links_counting_turns(mechanism)
         self.mechanism, self.motions = mechanism, motions
-        self.pairs = tuple(motions[each.pair] for each in mechanism.stops)
-        self.low = np.array([-np.inf if each.low is None else each.low for each in mechanism.stops])
-        self.high = np.array([np.inf if each.high is None else each.high for each in mechanism.stops])
+        self.pairs = tuple(motions[stop.pair] for stop in mechanism.stops)
+        self.low = np.array([-np.inf if stop.low is None else stop.low for stop in mechanism.stops])
+        self.high = np.array([np.inf if stop.high is None else stop.high for stop in mechanism.stops])
         self.scale = np.array([size if pair.input_kind is MeasureKind.LENGTH else 1.0 for pair in self.pairs])
         self.is_periodic = np.array(
             [pair.input_kind is MeasureKind.ANGLE and not counting.issuperset(pair.links) for pair in self.pairs]
@@ -82,8 +82,8 @@ class PairStops:
 
     def rooms(self, positions: Array, turns: Array | None = None) -> Array:
         """How far positions (stops,) are from their lower and upper stops (2, stops), rad or sizes; negative beyond."""
-        at = positions + (self.turns(positions) if turns is None else turns)
-        return np.array([at - self.low, self.high - at]) / self.scale
+        turned = positions + (self.turns(positions) if turns is None else turns)
+        return np.array([turned - self.low, self.high - turned]) / self.scale
 
     def sure_rows(self, positions: Array, z: Array) -> BoolArray:
         """Which rows of a run surely come before any stop (rows,): positions (stops, rows), unknowns (rows, unknowns).
@@ -105,8 +105,8 @@ class PairStops:
 
     def side(self, is_upper: bool, index: int) -> MetStop:
         """One stop."""
-        each = self.mechanism.stops[index]
-        return MetStop(each.pair, float((self.high if is_upper else self.low)[index]), bool(is_upper), each.restitution)
+        stop = self.mechanism.stops[index]
+        return MetStop(stop.pair, float((self.high if is_upper else self.low)[index]), bool(is_upper), stop.restitution)
 
     def met_at(self, positions: Array) -> tuple[MetStop, ...]:
         """The stops at which positions (stops,) are, or beyond which."""
@@ -115,8 +115,7 @@ class PairStops:
 
     def describe_met(self, positions: Array) -> str:
         """The stops that are met, in words."""
-        met = self.met_at(positions)
-        return join_names([each.describe(self.motions, self.mechanism.units) for each in met])
+        return join_names([stop.describe(self.motions, self.mechanism.units) for stop in self.met_at(positions)])
 
     def refusal_outside(self, positions: Array, where: str) -> NoAnswer | None:
         """What to say of a position that lies outside of stops; None of one that does not."""
@@ -126,7 +125,7 @@ class PairStops:
             return None
         k, units = int(beyond[np.argmin(rooms.min(axis=0)[beyond])]), self.mechanism.units
         kind = self.pairs[k].input_quantity_kinds()[0]
-        low, high = (amount(float(each), kind, units) for each in (self.low[k], self.high[k]))
+        low, high = (amount(float(limit), kind, units) for limit in (self.low[k], self.high[k]))
         if not np.isfinite(self.low[k]):
             allowed, side = f"its stop at {high}", "above"
         elif not np.isfinite(self.high[k]):

@@ -312,12 +312,12 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
         gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), residual))
     pair = max(gaps, key=lambda name: gaps[name])
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
-    by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
+    unit, quantity = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
     cut_off = f" (the search stopped after {failure.effort:.0f} steps)" if failure.is_cut_off else ""
     return (
         f"{setup.describe_position()} {links} cannot be joined{cut_off}: at the nearest, pair {pair!r} stays open by "
-        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; {_remedy(setup, failure, links)}"
+        f"{amount(gaps[pair] * unit, quantity, setup.mechanism.units)}; {_remedy(setup, failure, links)}"
     )
 
 
@@ -362,8 +362,10 @@ def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     if not sets:
         return "; leave one out"
     clauses = [
-        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quote_names(each)} move one another"
-        for each in sets[:3]
+        f"the input at {pairs[0]!r} cannot move"
+        if len(pairs) == 1
+        else f"those at {quote_names(pairs)} move one another"
+        for pairs in sets[:3]
     ]
     which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
     return f": {join_all_names(clauses)}; leave {which} out"
@@ -398,8 +400,8 @@ def _inputs_at(pairs: Sequence[str]) -> str:
     return f"the input{'s' * (len(pairs) != 1)} at {quote_names(pairs)}"
 
 
-def _offered_pairs(setup: PreparedMechanism, links: Sequence[str], most: int) -> str:
+def _offered_pairs(setup: PreparedMechanism, links: Sequence[str], maximum: int) -> str:
     """Pairs of these links that have no input, to be offered."""
     taken = {given.pair for given in setup.mechanism.inputs}
     offered = [name for name, pair in setup.pairs.items() if set(pair.links) & set(links) and name not in taken]
-    return " or ".join(map(repr, offered[:most])) or "another pair"
+    return " or ".join(map(repr, offered[:maximum])) or "another pair"
