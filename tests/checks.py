@@ -22,17 +22,8 @@ def same_angles(found, wanted, far):
 def passes_residual_check(mechanism, motion):
     """Whether every row is closed by the pairs' own formulas, run on plain numbers."""
     solver = PositionSolver(mechanism)
-
-    def still(frame):
-        if frame.fixed:
-            return frame
-        angle = frame.angle.parts[0]
-        return frame._replace(x=frame.x.parts[0], y=frame.y.parts[0], angle=angle, cos=np.cos(angle), sin=np.sin(angle))
-
-    frames = {name: still(frame) for name, frame in motion.frames.items()}
-    own = {name: [jet.parts[0] for jet in each] for name, each in motion.own.items()}
-    u = np.array([given.position for given in motion.inputs.values()])
-    gaps = solver.residual_check.residuals(frames, own, u)
+    u = np.stack([given.position for given in motion.inputs.values()], axis=1) / solver.input_scale
+    gaps = solver.coordinate_residuals(solver.coordinates(motion.frames, motion.own), u)
     return gaps.shape[1] == len(motion) and bool(np.all(gaps <= solver.tolerance))
 
 

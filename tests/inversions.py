@@ -12,8 +12,8 @@ import numpy as np
 from planar.assemblies.polynomial.completeness import BlockRoots
 from planar.document import files
 from planar.equations.symbolic_equations import slice_length
-from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, block_residual_function
-from planar.solving.newton import damped_newton
+from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE
+from planar.solving.newton import block_residual_function, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.linkages import Builder, Built, _joints
 

@@ -15,7 +15,7 @@ from planar.model.mechanism import Drive, Mechanism, named_points, relative_moti
 from planar.model.pairs import MeasureKind
 from planar.reports.files.converted import written_text
 from planar.results.motion import State
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 
 UNITLESS = ("pmks", "pyslvs")
 """Formats that name no unit of length: what is read of them is taken as mm."""

@@ -35,10 +35,11 @@ from planar.equations.functions import EquationFunctions
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
-from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function
+from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 from planar.solving.newton import (
     CLOSED_TOLERANCE,
     ResidualFunction,
+    block_residual_function,
     damped_newton,
     one_system,
     polish_root,

@@ -21,7 +21,7 @@ from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import quote_names
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
-from planar.solving.diagnosis.remedy import RemedyChange, mending_dimensions, mending_inputs
+from planar.solving.diagnosis.remedy import RemedyChange, RemedySearch
 from planar.solving.position import PositionSolver, solved_mechanism
 
 TOO_LONG_MARGIN = 1e-9
@@ -62,12 +62,12 @@ class Conflict:
     @cached_property
     def dimensions(self) -> tuple[RemedyChange, ...]:
         """Changes of one dimension each that let the whole go together, the least first of those found."""
-        return tuple(mending_dimensions(self._solver, self._failure, frozenset(self.links), thorough=True))
+        return tuple(RemedySearch(self._solver, self._failure, thorough=True).dimensions(frozenset(self.links)))
 
     @cached_property
     def positions(self) -> tuple[RemedyChange, ...]:
         """Positions of one input each, the others standing still, with which it goes together: the nearest found."""
-        return tuple(mending_inputs(self._solver, self._failure, self.inputs, thorough=True))
+        return tuple(RemedySearch(self._solver, self._failure, thorough=True).positions(self.inputs))
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.model.mechanism import pair_entries
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.assembly.sketch_start import sketch_coordinates
-from planar.solving.full_constraints import FullConstraints
+from planar.solving.full_constraints import FullConstraints, sketch_coordinates
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -16,8 +16,8 @@ from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.time_limit import stop_if_over
 from planar.model.pairs import MeasureKind
-from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies, is_out_of_reach
-from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
+from planar.solving.assembly.block_assemblies import block_dependencies, closed_form_roots
+from planar.solving.newton import CLOSED_TOLERANCE, block_residual_function, one_system, repeat_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
@@ -309,7 +309,10 @@ def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool
         left, _ = setup.functions.block_call(stage)(z, setup.inputs.u, setup.inputs.p)
         stands = int(np.abs(left).max(initial=0.0) <= CLOSED_TOLERANCE)
         return _uncertified_roots(np.zeros((stands, 0)), stands, "it stands with the others")
-    known = _linear_roots(setup, stage, z) or _dyad_roots(setup, stage, z)
+    known = _linear_roots(setup, stage, z)
+    if known is None:
+        dyad = closed_form_roots(setup, stage, z)
+        known = None if dyad is None else _uncertified_roots(np.array(dyad).reshape(-1, 2), 2, "in closed form")
     if known is not None and not certify:
         return known
     # positions of dyads alone are told without what larger blocks need
@@ -338,22 +341,11 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
     """Whether the Jacobian of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
-    closing, many = _residual_function(setup, stage, z), slice_length(stage.unknowns)
+    many = slice_length(stage.unknowns)
+    closing = one_system(block_residual_function(setup.functions, stage, z, setup.inputs.u, setup.inputs.p))
     slope = closing(np.zeros(many))[1]
     others = (closing(each)[1] for each in generic_numbers(2, many))
     return all(np.abs(other - slope).max(initial=0.0) <= JACOBIAN_ROUNDING for other in others)
-
-
-def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
-    """What a block leaves open (rows,) and its Jacobian (rows, unknowns) at its own unknowns."""
-
-    def closing(own: Array) -> tuple[Array, Array]:
-        whole = z.copy()
-        whole[stage.unknowns] = own
-        left, slope = setup.functions.block_call(stage)(whole, setup.inputs.u, setup.inputs.p)
-        return left[0], slope.T
-
-    return closing
 
 
 def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
@@ -362,8 +354,7 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
     rows = e.rows[stage.rows]
     if len(rows) != many or (many > 1 and any(row.kind is MeasureKind.ANGLE for row in rows)):
         return None
-
-    closing = _residual_function(setup, stage, z)
+    closing = one_system(block_residual_function(setup.functions, stage, z, setup.inputs.u, setup.inputs.p))
     at: Array = np.zeros(many)
     slope = closing(at)[1]
     if not is_linear(setup, stage, z):
@@ -376,14 +367,3 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
     if np.abs(closing(at)[0]).max() > CLOSED_TOLERANCE:
         return None
     return _uncertified_roots(at[None], 1, "its equations are linear")
-
-
-def _dyad_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
-    """The two assemblies of a block with a closed form, always in the same order; None where they all but meet."""
-    form = setup.functions.block_assemblies(stage)
-    if form is None:
-        return None
-    both, left, bend = form(z, setup.inputs.u, setup.inputs.p)
-    if bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE:
-        return _uncertified_roots(np.array(both), 2, "in closed form")
-    return _uncertified_roots(np.zeros((0, 2)), 2, "in closed form") if is_out_of_reach(bend) else None

@@ -145,7 +145,7 @@ class ReferenceDesign:
             }
 
     def tolerance(self, p: Array) -> float:
-        """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
+        """What the residual check allows for these designs: as `PreparedMechanism.tolerance`, of the longest of any."""
         rows = self._length_rows
         least, greatest = (bound[rows] for bound in self._row_bounds(p))
         reach = float(max(greatest.max(initial=0.0), -least.min(initial=0.0)))

@@ -43,7 +43,7 @@ from planar.model.mechanism import Mechanism, curved_slots, named_points
 from planar.model.pairs.cams.profiled import ProfiledPair
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 
 PIN_SHARE = 0.1
 """Of the middle one of the distances between pins, of which the pins' diameter is to be about so much."""

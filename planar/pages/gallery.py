@@ -24,8 +24,7 @@ from planar.pages.overlay_style import round_value_script
 from planar.pages.page import PageLink, fill_template, page, script_safe_json
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import solved_mechanism
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position, solved_mechanism
 
 SCRIPTS = (
     "stage/plane.js",

@@ -10,8 +10,6 @@ import numpy as np
 
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.geometry import frame_at
-from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.safe_files import save_file
 from planar.foundation.time_limit import stop_if_over, stops_in_time
@@ -166,12 +164,6 @@ def _presentation(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ..
 
 def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.ndarray:
     """The unknowns of a position, or of a row of a motion, in the equations of its mechanism."""
-
-    def number(value: Scalar) -> float:
-        rows = np.ravel(value.parts[0] if isinstance(value, Jet) else value)
-        return float(rows[row if rows.size > 1 else 0])  # what stands still has one for all
-
     solver = solved_mechanism(mechanism).solver
-    frames = {name: frame_at(*map(number, (frame.x, frame.y, frame.angle))) for name, frame in shown.frames.items()}
-    own = {name: tuple(map(number, values)) for name, values in shown.own.items()}
-    return solver.coordinates(frames, own)[list(solver.equations.unknowns)]
+    w = np.atleast_2d(solver.coordinates(shown.frames, shown.own))
+    return w[row if len(w) > 1 else 0, list(solver.equations.unknowns)]

@@ -19,7 +19,7 @@ from planar.equations.rank_conditions import LowRankBlock, constraint_dependenci
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
-from planar.solving.newton import correct, shortest_step
+from planar.solving.newton import correct_position
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_CONDITIONS = 24
@@ -34,75 +34,61 @@ def deflate(setup: PreparedMechanism, weak: Sequence[Block], z: Array) -> tuple[
     """The program in which blocks that are singular at z, and all along the motion, keep this rank
     as a constraint too; and z by it. None where they are singular in this position alone, or something is free.
     """
-    y = np.concatenate([z, setup.inputs.u])
     for with_earlier in (False, True):
         blocks = {stage.block_index: _low_rank_block(setup, stage, z, with_earlier) for stage in weak}
         known = {level: block for level, block in blocks.items() if block is not None}
         if len(known) < len(blocks):
             continue
         program = with_rank_conditions(setup.functions, known)
-        there = _correct(setup, program, y, z.size)
-        if there is not None and _holds_along_motion(setup, program, there):
-            return program, there[: z.size]
+        y = _correct(setup, program, z, setup.inputs.u, z.size)
+        if y is not None and _holds_along_motion(setup, program, y):
+            return program, y[: z.size]
     return None
 
 
 def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y: Array) -> bool:
     """Whether only the motions that inputs can make are left, and the rank is as low wherever these lead.
 
-    So many ways at first order as inputs are there on their dead points too.
+    There are as many motions at first order as inputs on their dead points too.
     """
     inputs = len(setup.inputs.u)
     if not inputs:
         return False
-    slope = np.asarray(program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1])
-    least = np.concatenate([setup.min_column_scale, np.ones(inputs)])
-    sizes = column_norms(slope, least)
-    ways = null_space(slope / sizes, MIN_REGULARITY, unit=1.0).T / sizes
-    if len(ways) != inputs:
+    jacobian = np.asarray(program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1])
+    sizes = column_norms(jacobian, np.concatenate([setup.min_column_scale, np.ones(inputs)]))
+    motions = null_space(jacobian / sizes, MIN_REGULARITY, unit=1.0).T / sizes
+    if len(motions) != inputs:
         return False
     for seed in range(PROBE_COUNT):
-        way = np.random.default_rng(seed).normal(size=inputs) @ ways
-        if _correct(setup, program, y + PROBE_DISTANCE * way / np.linalg.norm(way), len(y)) is None:
+        motion = np.random.default_rng(seed).normal(size=inputs) @ motions
+        probe = y + PROBE_DISTANCE * motion / np.linalg.norm(motion)
+        if _correct(setup, program, probe[:-inputs], probe[-inputs:], len(y)) is None:
             return False
     return True
 
 
-def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, free_count: int) -> Array | None:
-    """The nearest position to y = (unknowns, inputs) that closes, of which the first `free` may move; None without."""
-    many, held = len(y) - len(setup.inputs.u), y[free_count:]
-
-    def here(x: Array) -> tuple[Array, Array]:
-        y = np.concatenate([x, held])
-        left, slope = program.residuals_and_jacobian(y[:many], y[many:], setup.inputs.p)
-        return left, slope[:, :free_count]
-
-    found, gap = correct(here, shortest_step(MIN_REGULARITY), y[:free_count], MAX_CORRECTIONS)
-    return np.concatenate([found, held]) if gap <= CLOSED_TOLERANCE else None
+def _correct(setup: PreparedMechanism, program: EquationFunctions, z: Array, u: Array, free_count: int) -> Array | None:
+    """Unknowns and inputs that close near z and u, of which the first `free_count` may move; None without."""
+    y, gap = correct_position(program, (z, u, setup.inputs.p), free_count, MIN_REGULARITY, MAX_CORRECTIONS)
+    return y if gap <= CLOSED_TOLERANCE else None
 
 
 def _low_rank_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
     """The low-rank part of a block's constraints, with those on which it rests if wanted; None of full rank."""
-    columns_of = constraint_dependencies(setup.functions)
-    stages = [stage]
-    columns = _dependent_columns(columns_of, stage)
-    for before in reversed(setup.equations.blocks[: stage.block_index] if with_earlier else ()):
-        if columns & set(range(before.unknowns.start, before.unknowns.stop)):
-            stages.append(before)
-            columns |= _dependent_columns(columns_of, before)
-    rows = [row for each in reversed(stages) for row in range(each.rows.start, each.rows.stop)]
-    many = sorted(columns)
-    both = setup.functions.jacobians(z[None], setup.inputs.u[None], setup.inputs.p)
-    own = np.hstack([each[0] for each in both])[np.ix_(rows, many)] / setup.row_scale[rows, None]
-    least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[many]
-    sizes = column_norms(own, least)
-    held = rank(own / sizes, MIN_REGULARITY, unit=1.0)
-    too_many = (len(rows) - held) * (len(many) - held) > MAX_CONDITIONS
-    if held == min(own.shape) or too_many:
+    columns_of_row = constraint_dependencies(setup.functions)
+    stages, columns = [stage], set().union(*columns_of_row[stage.rows])
+    for earlier in reversed(setup.equations.blocks[: stage.block_index] if with_earlier else ()):
+        if columns & set(range(earlier.unknowns.start, earlier.unknowns.stop)):
+            stages.append(earlier)
+            columns |= set().union(*columns_of_row[earlier.rows])
+    rows = [row for block in reversed(stages) for row in range(block.rows.start, block.rows.stop)]
+    variables = sorted(columns)
+    jacobian = np.asarray(setup.functions.residuals_and_jacobian(z, setup.inputs.u, setup.inputs.p)[1])
+    jacobian = jacobian[np.ix_(rows, variables)] / setup.row_scale[rows, None]
+    least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[variables]
+    sizes = column_norms(jacobian, least)
+    block_rank = rank(jacobian / sizes, MIN_REGULARITY, unit=1.0)
+    too_many = (len(rows) - block_rank) * (len(variables) - block_rank) > MAX_CONDITIONS
+    if block_rank == min(jacobian.shape) or too_many:
         return None
-    return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, held)
-
-
-def _dependent_columns(columns_of: Sequence[frozenset[int]], stage: Block) -> set[int]:
-    """The columns that a block's constraints depend on."""
-    return set().union(*columns_of[stage.rows])
+    return LowRankBlock(tuple(rows), tuple(variables), setup.row_scale[rows], sizes, block_rank)

@@ -13,14 +13,15 @@ import numpy as np
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges, frames_from_coordinates
 from planar.equations.elements import ElementGroup, ElementPlacement, group_elements, pattern_of_groups
 from planar.equations.mechanism_numbers import scaled_pair_numbers
-from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals
+from planar.equations.residuals import ConstraintRow, pair_residuals
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, IntArray
-from planar.foundation.geometry import Frame
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
+from planar.model.link_shapes import fitted_frame
+from planar.model.mechanism import named_points, sketched_places
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.checks.singular_values import null_space
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -30,6 +31,8 @@ NEAR_DAMPING = 1e-6
 """Of first steps: what is looked for is near by."""
 MAX_STARTS = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
+START_SPREAD = 0.5
+"""Sizes, rad: how far starts after the first are spread about what the sketch shows."""
 PROBE_DISTANCE = 0.02
 """How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
 MIN_PROBES, MAX_PROBES = 3, 12
@@ -59,30 +62,31 @@ class FullConstraints:
 
     def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
         """The residual of every constraint, with its row, at coordinates of any arithmetic; angles with their turns."""
-        frames, own = self._frames_and_own(w)
+        frames, own = frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
         return pair_residuals(self.pairs, frames, self._numbers, own)
 
-    def jacobian(self, w: Array) -> Array:
-        """(rows, coordinates)"""
-        return self.residuals_and_jacobian(w)[1]
+    def jacobian(self, w: Array, held: tuple[str, ...] = ()) -> Array:
+        """(rows, coordinates) of the pairs, then of relative motions that are held."""
+        return self.residuals_and_jacobian(w, held)[1]
+
+    def free_motions(self, w: Array, held: tuple[str, ...] = ()) -> Array:
+        """The motions that are free to first order at w while relative motions are held: orthonormal columns
+        (coordinates, freedoms)."""
+        return null_space(self.jacobian(w, held))
 
     def relative_positions(self, names: tuple[str, ...], w: Array) -> Array:
-        """The drives of these relative motions (names,)."""
-        return np.array(self._relative_positions(names, w))
+        """The positions of these relative motions (names,)."""
+        return self.residuals_and_jacobian(w, names)[0][len(self.pair_of_row) :]
 
     def relative_jacobian(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
-        return self.residuals_and_jacobian(w, names)[1][len(self.pair_of_row) :]
-
-    def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
-        frames, own = self._frames_and_own(w)
-        return input_positions([self.setup.relative_motions[name] for name in names], frames, self._numbers, own)
+        return self.jacobian(w, names)[len(self.pair_of_row) :]
 
     def points_and_jacobian(self, members: Sequence[tuple[str, str]], w: Array) -> tuple[Array, Array]:
         """Where points (link, point) are, x and y of each (2 points,), in sizes, and the Jacobian (2 points,
         coordinates)."""
-        frames, _ = self._frames_and_own(w)
         shapes, scale = self.setup.shapes, 1.0 / self.setup.unit
+        frames, _ = frames_from_coordinates(w, self.setup.column, shapes, {})
         places: Array = np.empty(2 * len(members))
         jacobian: Array = np.zeros((2 * len(members), len(w)))
         for row, (link, point) in enumerate(members):
@@ -93,22 +97,18 @@ class FullConstraints:
                 jacobian[2 * row : 2 * row + 2, columns] = (1.0, 0.0, -arm.y), (0.0, 1.0, arm.x)
         return places, jacobian
 
-    def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-        return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
+    def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | float = 0.0) -> Array | None:
+        """The nearest closed position by Gauss and Newton's method, relative motions held at positions; None where
+        there is none."""
+        closed = self.correct_all(w[None], held, positions)
+        return closed[0] if len(closed) else None
 
-    def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
-        """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
-        return self.correct_all(w[None], held, positions)[0]
-
-    def correct_all(
-        self, starts: Array, held: tuple[str, ...] = (), positions: Array | None = None
-    ) -> list[Array | None]:
-        """The same from several starts (starts, coordinates) at once."""
-        targets = np.zeros(len(held)) if positions is None else positions
+    def correct_all(self, starts: Array, held: tuple[str, ...] = (), positions: Array | float = 0.0) -> Array:
+        """The same from several starts (starts, coordinates) at once, those that lead to a closed position."""
         result = damped_newton(
-            lambda w: self.residuals_and_jacobian(w, held, targets), starts, CLOSED_TOLERANCE, NEAR_DAMPING
+            lambda w: self.residuals_and_jacobian(w, held, positions), starts, CLOSED_TOLERANCE, NEAR_DAMPING
         )
-        return [w if converged else None for w, converged in zip(result.unknowns, result.converged, strict=True)]
+        return result.unknowns[result.converged]
 
     def residuals_and_jacobian(
         self, w: Array, held: tuple[str, ...] = (), positions: Array | float = 0.0
@@ -149,16 +149,15 @@ class FullConstraints:
         return np.array([[number for numbers in self._numbers.values() for number in numbers]], dtype=float)
 
     def _groups_with(self, held: tuple[str, ...]) -> list[ElementGroup]:
-        groups = self._groups.get(held)
-        if groups is None:
+        if held not in self._groups:
             placed, row = [], 0
             for pair in self.pairs:
                 placed.append(self._placement.residual_of(pair, row))
                 row += len(pair.residual_kinds)
             motions = [self.setup.relative_motions[name] for name in held]
             placed += [self._placement.input_position_of(motion, row + k) for k, motion in enumerate(motions)]
-            groups = self._groups[held] = group_elements(placed)
-        return groups
+            self._groups[held] = group_elements(placed)
+        return self._groups[held]
 
     @cached_property
     def _placement(self) -> ElementPlacement:
@@ -174,44 +173,69 @@ class FullConstraints:
         )
 
 
+def sketch_coordinates(setup: PreparedMechanism, seed: int) -> Array:
+    """Coordinates w with the links about where the sketch has their points; what it does not show is at random.
+
+    Pins on the frame are where the frame has them.
+    """
+    rng = np.random.default_rng(seed)
+    w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
+    frame, places = setup.mechanism.frame, sketched_places(setup.mechanism)
+    for named in named_points(setup.mechanism):
+        on_frame = [setup.shapes[frame].points[point] for link, point in named.members if link == frame]
+        for link, point in named.members if on_frame else ():
+            places.setdefault(link, {})[point] = on_frame[-1]
+    for link, points in places.items():
+        if (link, "x") not in setup.column:
+            continue
+        columns = [setup.column[link, part] for part in FRAME_PARTS]
+        fitted = fitted_frame(setup.shapes[link], points)
+        if fitted is None:
+            angle = float(w[columns[2]]) * np.pi
+            axis = Vector(np.cos(angle), np.sin(angle))
+            origins = [place - setup.shapes[link].points[point].rotate(axis) for point, place in points.items()]
+            w[columns] = *(np.mean(origins, axis=0) / setup.unit), angle
+        else:
+            w[columns] = fitted.x / setup.unit, fitted.y / setup.unit, fitted.angle
+    return w + (START_SPREAD * rng.normal(size=w.size) if seed else 0.0)
+
+
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:
     """A random move of a length within the columns of `free`."""
-    way = free @ rng.normal(size=free.shape[1])
-    return way * (length / np.linalg.norm(way))
+    move = free @ rng.normal(size=free.shape[1])
+    return move * (length / np.linalg.norm(move))
 
 
 def find_closed_position(constraints: FullConstraints) -> Array | None:
     """A closed position near the sketch, with the inputs where they are if that can be; None where none is found."""
     setup = constraints.setup
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    for held, at in ((names, setup.inputs.u), ((), None)):
+    for held in dict.fromkeys((names, ())):
         for seed in range(MAX_STARTS):
-            found = constraints.correct(sketch_coordinates(setup, seed), held, at)
-            if found is not None:
-                return found
-        if not names:
-            break
+            w = constraints.correct(sketch_coordinates(setup, seed), held, setup.inputs.u if held else 0.0)
+            if w is not None:
+                return w
     return None
 
 
 def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array]:
     """The dimension of the motion that leads away from a position, and a position on it."""
-    free = null_space(constraints.jacobian(w))
-    found, place, held = 0, w, -1
+    free = constraints.free_motions(w)
+    dimension, rank, position = 0, -1, w
     single = free.shape[1] == 1  # which leaves two directions to probe, and no random ones
     for seed in range((2 if single else MAX_PROBES) if free.size else 0):
         rng = np.random.default_rng(seed)
         step = (1.0 - 2.0 * seed) * PROBE_DISTANCE * free[:, 0] if single else random_step(free, rng, PROBE_DISTANCE)
-        away = constraints.correct(w + step)
-        if away is not None:
-            free_there = null_space(constraints.jacobian(away))
-            ways, holds = _spread_dimension(constraints, away, free_there, rng), w.size - free_there.shape[1]
+        probe = constraints.correct(w + step)
+        if probe is not None:
+            probe_free = constraints.free_motions(probe)
+            spread = _spread_dimension(constraints, probe, probe_free, rng), w.size - probe_free.shape[1]
             # of places that move alike the one where nothing is singular: some fall back beside w
-            if (ways, holds) > (found, held):
-                found, place, held = ways, away, holds
-        if seed >= MIN_PROBES and found + held == w.size:
+            if spread > (dimension, rank):
+                (dimension, rank), position = spread, probe
+        if seed >= MIN_PROBES and dimension + rank == w.size:
             break
-    return found, place
+    return dimension, position
 
 
 def _spread_dimension(constraints: FullConstraints, w: Array, free: Array, rng: np.random.Generator) -> int:
@@ -220,8 +244,8 @@ def _spread_dimension(constraints: FullConstraints, w: Array, free: Array, rng: 
     if not count:
         return 0
     starts = np.array([w + random_step(free, rng, NEIGHBOUR_DISTANCE) for _ in range(count)])
-    moves = [(place - w) / NEIGHBOUR_DISTANCE for place in constraints.correct_all(starts) if place is not None]
-    if not moves:
+    moves = (constraints.correct_all(starts) - w) / NEIGHBOUR_DISTANCE
+    if not len(moves):
         return 0
-    values = np.linalg.svd(np.array(moves), compute_uv=False)
+    values = np.linalg.svd(moves, compute_uv=False)
     return int(np.sum(values > 0.1 * np.sqrt(len(moves) / free.shape[1])))

@@ -13,8 +13,7 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
-from planar.equations.placed_blocks import BlockCall
-from planar.equations.symbolic_equations import slice_length
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array, greatest_size
 
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
@@ -64,7 +63,7 @@ class NewtonResult(NamedTuple):
 
     def joined(self, other: NewtonResult) -> NewtonResult:
         """The ends of the starts of both."""
-        unknowns, residual, converged = (np.concatenate(both) for both in zip(self[:3], other[:3], strict=True))
+        unknowns, residual, converged = (np.concatenate(parts) for parts in zip(self[:3], other[:3], strict=True))
         return NewtonResult(unknowns, residual, converged, self.steps + other.steps)
 
 
@@ -84,44 +83,44 @@ def damped_newton(
     """
     z = np.array(starts, dtype=float)
     count, unknowns = z.shape
-    left, slope = residual_function(z)
+    residuals, jacobian = residual_function(z)
     if unknowns == 0:
-        return _newton_result(z, left, tolerance, 0)
-    cost = np.add.reduce(left * left, axis=1)
+        return _newton_result(z, residuals, tolerance, 0)
+    cost = np.add.reduce(residuals * residuals, axis=1)
     damping, growth = np.full(count, first_damping), np.full(count, 2.0)
-    ended_at, ended_with, busy = z.copy(), left.copy(), np.arange(count)
+    end, end_residuals, active = z.copy(), residuals.copy(), np.arange(count)
     steps = 0
     while steps < MAX_NEWTON_STEPS:
         steps += 1
-        step = _damped_step(left, slope, damping)
-        tried = z + step
-        new_left, new_slope = residual_function(tried)
-        new_cost = np.add.reduce(new_left * new_left, axis=1)
+        step = _damped_step(residuals, jacobian, damping)
+        trial = z + step
+        new_residuals, new_jacobian = residual_function(trial)
+        new_cost = np.add.reduce(new_residuals * new_residuals, axis=1)
         gain, better = cost - new_cost, new_cost < cost
         settled = (np.maximum.reduce(np.abs(step), axis=1) < SETTLED_STEP) | (damping > MAX_DAMPING)
         # closed, or far from closed and hardly coming closer: a start that ends where nothing closes
         stalled = (gain < STALLED_COST_RATIO * cost) & (new_cost > STALLED_COST)
-        settled |= better & (stalled | (new_cost <= ROUNDED_COST * left.shape[1]))
-        foreseen = left + np.matmul(slope, step[:, :, None])[:, :, 0]
-        foreseen_gain = np.maximum(cost - np.add.reduce(foreseen * foreseen, axis=1), 1e-300)
-        ratio = np.where(better, np.minimum(gain / foreseen_gain, 1.0), 0.0)
+        settled |= better & (stalled | (new_cost <= ROUNDED_COST * residuals.shape[1]))
+        predicted = residuals + np.matmul(jacobian, step[:, :, None])[:, :, 0]
+        predicted_gain = np.maximum(cost - np.add.reduce(predicted * predicted, axis=1), 1e-300)
+        ratio = np.where(better, np.minimum(gain / predicted_gain, 1.0), 0.0)
         lower = np.maximum(damping * np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, MIN_DAMPING_RATIO), MIN_DAMPING)
         damping, growth = np.where(better, lower, damping * growth), np.where(better, 2.0, 2.0 * growth)
         if better.all():
-            z, left, slope, cost = tried, new_left, new_slope, new_cost
+            z, residuals, jacobian, cost = trial, new_residuals, new_jacobian, new_cost
         elif better.any():
-            z, left = np.where(better[:, None], tried, z), np.where(better[:, None], new_left, left)
-            slope, cost = np.where(better[:, None, None], new_slope, slope), np.where(better, new_cost, cost)
+            z, residuals = np.where(better[:, None], trial, z), np.where(better[:, None], new_residuals, residuals)
+            jacobian, cost = np.where(better[:, None, None], new_jacobian, jacobian), np.where(better, new_cost, cost)
         if settled.any():
-            ended_at[busy[settled]], ended_with[busy[settled]] = z[settled], left[settled]
-            on = ~settled
-            busy, z, left, slope, cost, damping, growth = (
-                each[on] for each in (busy, z, left, slope, cost, damping, growth)
+            end[active[settled]], end_residuals[active[settled]] = z[settled], residuals[settled]
+            remaining = ~settled
+            active, z, residuals, jacobian, cost, damping, growth = (
+                values[remaining] for values in (active, z, residuals, jacobian, cost, damping, growth)
             )
-            if not busy.size:
+            if not active.size:
                 break
-    ended_at[busy], ended_with[busy] = z, left
-    return _newton_result(ended_at, ended_with, tolerance, steps)
+    end[active], end_residuals[active] = z, residuals
+    return _newton_result(end, end_residuals, tolerance, steps)
 
 
 def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
@@ -147,17 +146,17 @@ def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
 
 def correct(residual_function: SystemFunction, solve_step: StepSolver, y: Array, max_steps: int) -> tuple[Array, float]:
     """Undamped steps from y (n,), as long as each leaves less open: the best place (n,), and what is open there."""
-    left, slope = residual_function(y)
-    gap = greatest_size(left)
+    residuals, jacobian = residual_function(y)
+    gap = greatest_size(residuals)
     if not gap < np.inf:
         return y, np.inf
     for _ in range(max_steps):
-        tried = y + solve_step(slope, left)
-        new_left, new_slope = residual_function(tried)
-        new_gap = greatest_size(new_left)
+        trial = y + solve_step(jacobian, residuals)
+        residuals, jacobian = residual_function(trial)
+        new_gap = greatest_size(residuals)
         if not new_gap < gap:
             break
-        y, left, slope, gap = tried, new_left, new_slope, new_gap
+        y, gap = trial, new_gap
     return y, gap
 
 
@@ -170,44 +169,69 @@ def polish_root(residual_function: ResidualFunction, z: Array) -> Array:
     """One root (n,) of a block carried to round-off."""
     if not z.size:
         return z
-    undamped = np.zeros(1)
-
-    def step(jacobian: Array, residuals: Array) -> Array:
-        return _damped_step(residuals[None], jacobian[None], undamped)[0]
-
-    return correct(one_system(residual_function), step, z, MAX_POLISHING_STEPS)[0]
+    system = one_system(residual_function)
+    return correct(system, lambda j, r: _damped_step(r[None], j[None], np.zeros(1))[0], z, MAX_POLISHING_STEPS)[0]
 
 
 def one_system(residual_function: ResidualFunction) -> SystemFunction:
-    """A function of many starts, for one."""
+    """The function of one start, from that of several."""
 
-    def at(z: Array) -> tuple[Array, Array]:
-        left, slope = residual_function(z[None])
-        return left[0], slope[0]
+    def evaluate_one(z: Array) -> tuple[Array, Array]:
+        residuals, jacobian = residual_function(z[None])
+        return residuals[0], jacobian[0]
 
-    return at
+    return evaluate_one
 
 
-def correct_blocks(
-    functions: EquationFunctions, p: Array, z: Array, u: Array, last_block: int | None = None
-) -> Array | None:
-    """All unknowns (n,) at inputs u from near by, block after block (to the last); None where one does not close."""
+def block_residual_function(
+    functions: EquationFunctions, block: Block, z: Array, u: Array, p: Array
+) -> ResidualFunction:
+    """The constraints of a block as a function of its own unknowns, those of earlier blocks in z and all numbers
+    given."""
+    function = functions.block_call(block)
+
+    def evaluate(block_unknowns: Array) -> tuple[Array, Array]:
+        count = len(block_unknowns)
+        starts = np.repeat(z[None], count, axis=0)
+        starts[:, block.unknowns] = block_unknowns
+        residuals, slopes = function.evaluate_batch(count, starts, u, p) if count > 1 else function(starts[0], u, p)
+        return residuals.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
+
+    return evaluate
+
+
+def correct_blocks(functions: EquationFunctions, p: Array, z: Array, u: Array, last_block: int) -> Array | None:
+    """All unknowns (n,) at inputs u from near by, block after block to the last; None where one does not close."""
     z = z.copy()
-    for block in functions.equations.blocks:
-        if not slice_length(block.rows) or (last_block is not None and block.block_index > last_block):
-            continue
-        own, evaluate = block.unknowns, functions.block_call(block)
-
-        def here(x: Array, own: slice = own, evaluate: BlockCall = evaluate) -> tuple[Array, Array]:
-            z[own] = x
-            left, slope = evaluate(z, u, p)
-            return left[0], slope.T.reshape(len(left[0]), len(x))
-
-        found, gap = correct(here, shortest_step(BLOCK_RANK_TOLERANCE), z[own].copy(), MAX_BLOCK_STEPS)
-        if gap > CLOSED_BLOCK_TOLERANCE:
-            return None
-        z[own] = found
+    for block in functions.equations.blocks[: last_block + 1]:
+        if slice_length(block.rows):
+            closing = one_system(block_residual_function(functions, block, z, u, p))
+            start = z[block.unknowns].copy()
+            z[block.unknowns], gap = correct(closing, shortest_step(BLOCK_RANK_TOLERANCE), start, MAX_BLOCK_STEPS)
+            if gap > CLOSED_BLOCK_TOLERANCE:
+                return None
     return z
+
+
+def correct_position(
+    functions: EquationFunctions,
+    position: tuple[Array, Array, Array],
+    free_count: int,
+    rank_tolerance: float,
+    max_steps: int,
+) -> tuple[Array, float]:
+    """The best place near a `position` (z, u, p) of which the first `free_count` of z and u may move, in steps of least
+    squares: unknowns and inputs, and what is open there."""
+    z, u, p = position
+    y, fixed = np.concatenate([z, u]), np.concatenate([z, u])[free_count:]
+
+    def evaluate(free: Array) -> tuple[Array, Array]:
+        y = np.concatenate([free, fixed])
+        residuals, jacobian = functions.residuals_and_jacobian(y[: len(z)], y[len(z) :], p)
+        return residuals, jacobian[:, :free_count]
+
+    free, gap = correct(evaluate, shortest_step(rank_tolerance), y[:free_count], max_steps)
+    return np.concatenate([free, fixed]), gap
 
 
 def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free_count: int) -> Array:
@@ -217,8 +241,8 @@ def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free
     """
     y = y.copy()
     for _ in range(LOWER_RANK_STEPS):
-        left, slope = residual_function(y)
-        y[:free_count] -= truncated_step(slope[:, :free_count], left, rank)
+        residuals, jacobian = residual_function(y)
+        y[:free_count] -= truncated_step(jacobian[:, :free_count], residuals, rank)
     return y
 
 
@@ -241,13 +265,13 @@ def refine_multiple_root(residual_function: ResidualFunction, root: Array, longe
     A step along what is all but open bends away before the next one brings it nearer, so none is refused; one that is
     longer than `longest_step` leads elsewhere.
     """
-    best, least = root, np.inf
+    best, minimum = root, np.inf
     for _ in range(MAX_MULTIPLE_ROOT_STEPS):
-        left, slope = residual_function(root[None])
-        left_open = float(np.abs(left).max())
-        if left_open < least:
-            best, least = root, left_open
-        step = np.linalg.pinv(slope[0], rcond=MULTIPLE_ROOT_RANK_TOLERANCE) @ left[0]
+        residuals, jacobian = residual_function(root[None])
+        gap = float(np.abs(residuals).max())
+        if gap < minimum:
+            best, minimum = root, gap
+        step = np.linalg.pinv(jacobian[0], rcond=MULTIPLE_ROOT_RANK_TOLERANCE) @ residuals[0]
         if not EPS < np.abs(step).max() < longest_step:
             break
         root = root - step
@@ -269,8 +293,8 @@ def settle(
     """
     leading, settled_step = still
     for _ in range(max_steps):
-        left, slope = residual_function(y)
-        step = solve_step(slope, left)
+        residuals, jacobian = residual_function(y)
+        step = solve_step(jacobian, residuals)
         size = greatest_size(step)
         if not size < np.inf or size > longest_step:
             return y, False

@@ -11,22 +11,18 @@ import numpy as np
 
 from planar.document.first_argument import takes_mechanism
 from planar.equations.coordinates import frames_from_coordinates
-from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
+from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
 from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
-from planar.foundation.geometry import Frame
-from planar.foundation.jets import Jet
+from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, with_unit_rate
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.assembly.nearest_assembly import (
-    Assembly,
-    AssemblySearchFailure,
-    find_nearest_assembly,
-    sketch_distance_remarks,
-)
-from planar.solving.checks.singular_values import MIN_REGULARITY
+from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
+from planar.solving.assembly.sketch_remarks import sketch_remarks
+from planar.solving.checks.residual_check import stack_motion
+from planar.solving.checks.singular_values import MIN_REGULARITY, null_space
 from planar.solving.continuation.fast_path import (
     MIN_FAST_REGULARITY,
     FastPosition,
@@ -34,14 +30,23 @@ from planar.solving.continuation.fast_path import (
     fast_position,
     is_surely_regular,
 )
-from planar.solving.lazy_frames import lazy_frames
 from planar.solving.newton import CLOSED_TOLERANCE
-from planar.solving.prepared_mechanism import PreparedMechanism
+from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
-    from planar.solving.continuation.bifurcation import SingularRates
-    from planar.solving.continuation.run_samples import BranchRates, InputRates
+    from planar.solving.assembly import least_misfit
+    from planar.solving.continuation import run_samples
+    from planar.solving.continuation.run_samples import BranchRates
     from planar.solving.continuation.solution_curve import CurvePoint
+    from planar.solving.diagnosis import judgement, refusals
+    from planar.solving.rates import regularity, sample_rates
+else:  # few positions need them
+    least_misfit = LazyModule("planar.solving.assembly.least_misfit")
+    judgement = LazyModule("planar.solving.diagnosis.judgement")
+    run_samples = LazyModule("planar.solving.continuation.run_samples")
+    refusals = LazyModule("planar.solving.diagnosis.refusals")
+    regularity = LazyModule("planar.solving.rates.regularity")
+    sample_rates = LazyModule("planar.solving.rates.sample_rates")
 
 
 @takes_mechanism
@@ -67,32 +72,66 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     known = solved_mechanism(mechanism)
     if not mechanism.inputs:
         known = solved_mechanism(known.completed_mechanism)
-    here, found = known.solver, known.assembly
+    start, z, remarks = known.solver, known.assembly.z, known.remarks
     if not drives:
         try:
-            return here.state(found.z, known.remarks)
+            return start.state(z, remarks)
         except NoAnswer as problem:
             raise known.structure_refusal(problem) or problem from None
     moved = replace_inputs(mechanism, tuple(drives))
-    quick = known.nearby_positions.position_at(moved)
-    if quick is not None:
-        return here.state_of(quick, known.remarks, moved)
-    there = here.with_inputs_of(moved)
-    z = known.nearby_positions.unknowns_at(there.inputs.u.tolist()) if there.unit == here.unit else None
-    if z is not None:
-        return there.state(z, known.remarks)
-    from planar.solving.continuation.path import follow_straight  # most ways are surely regular
+    fast = known.nearby_positions.position_at(moved)
+    if fast is not None:
+        return start.fast_state(fast, remarks, moved)
+    target = start.with_inputs_of(moved)
+    nearby = known.nearby_positions.unknowns_at(target.inputs.u.tolist()) if target.unit == start.unit else None
+    if nearby is not None:
+        return target.state(nearby, remarks)
+    from planar.solving.continuation.path import follow_straight  # most paths are surely regular
 
-    # in the lengths of the size here: without a link's length a farther input makes the size greater
-    scale = np.where(here.structure.input_slides, there.unit / here.unit, 1.0)
-    way = follow_straight(here, found.z, here.inputs.u, there.inputs.u * scale)
-    told = known.remarks
-    if way.passed or way.nearby:
+    # in lengths of the start's size: without a link's length a farther input makes the size greater
+    u = target.inputs.u * (target.input_scale / start.input_scale)
+    path = follow_straight(start, z, start.inputs.u, u)
+    if path.passed or path.nearby:
         from planar.solving.continuation.events import change_point_remarks
 
-        told = (*told, *change_point_remarks(here, way.passed, way.nearby))
-    by = (here.scale / there.scale)[list(here.equations.unknowns)]
-    return there.state(way.z[-1] * by, told)
+        remarks = (*remarks, *change_point_remarks(start, path.passed, path.nearby))
+    unknown_scale = (start.scale / target.scale)[list(start.equations.unknowns)]
+    return target.state(path.z[-1] * unknown_scale, remarks)
+
+
+def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
+    """The position that `solve` finds, all rates zero, as dead points and change points allow; its mobility is that of
+    this position.
+
+    Raises NoAnswer where the mechanism cannot be assembled, or inputs leave it free or cannot be moved there.
+    """
+    from planar.solving.full_constraints import FullConstraints
+
+    known = solved_mechanism(mechanism)
+    solver, z, remarks = known.solver, known.assembly.z, known.remarks
+    if drives:
+        from planar.solving.continuation.path import follow_to
+
+        target = solver.with_inputs_of(replace_inputs(mechanism, tuple(drives)))
+        z = follow_to(target, z, solver.inputs.u, target.inputs.u)
+        solver = target
+    u, p = solver.inputs.u, solver.inputs.p
+    residual, pair = solver.worst_residual(z)
+    if residual > solver.tolerance:
+        raise refusals.not_closed(solver, pair, residual)
+    w = solver.functions.coordinates(z, u, p)
+    solver.refuse_open_contact(stack_motion([w[None], *[0.0 * w[None]] * 2], [u[None], *[0.0 * u[None]] * 2]))
+    # what is held to second order only is no freedom: the pairs' own Jacobian does not see it, the deflated one does
+    if solver.is_deflated or solver.equations.open_rows:
+        jacobian = np.asarray(solver.functions.residuals_and_jacobian(z, u, p)[1])
+    else:
+        jacobian = FullConstraints(solver).jacobian(w)
+    mobility = null_space(jacobian).shape[1] if w.size else 0
+    if np.any(solver.block_regularity(z) < MIN_REGULARITY):
+        note = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"
+        remarks = (*remarks, note)
+    frames, own = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
+    return State(solver.mechanism, mobility, residual, remarks, frames, own, solver.shapes)
 
 
 class PositionSolver(PreparedMechanism):
@@ -104,16 +143,14 @@ class PositionSolver(PreparedMechanism):
 
     def find_assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
-        found = self.nearest()
-        if isinstance(found, AssemblySearchFailure):
-            raise self.unassembled(found)
-        return found
+        assembly = self.nearest()
+        if isinstance(assembly, AssemblySearchFailure):
+            raise self.unassembled(assembly)
+        return assembly
 
     def nearest(self) -> Assembly | AssemblySearchFailure:
         """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
         if any(stage.is_free for stage in self.equations.blocks):
-            from planar.solving.diagnosis import refusals
-
             raise refusals.free_links(self)
         if self.equations.open_rows:
             return self._nearest_least_misfit()
@@ -121,71 +158,55 @@ class PositionSolver(PreparedMechanism):
 
     def _nearest_least_misfit(self) -> Assembly:
         """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
-        from planar.solving.assembly.least_misfit import find_least_misfit, refuse_misfit  # few mechanisms have one
-
         exact = PositionSolver(replace(self.mechanism, closes_within=None))
-        found = find_least_misfit(self, exact, exact._is_regular)
-        if isinstance(found, AssemblySearchFailure):
-            raise exact.unassembled(found)
-        refuse_misfit(self, found.z, self.inputs.u)
-        return found
+        assembly = least_misfit.find_least_misfit(self, exact, exact._is_regular)
+        if isinstance(assembly, AssemblySearchFailure):
+            raise exact.unassembled(assembly)
+        least_misfit.refuse_misfit(self, assembly.z, self.inputs.u)
+        return assembly
 
-    def remarks(self, found: Assembly) -> tuple[str, ...]:
-        """What there is to say of an assembly."""
-        remarks = self.mechanism.remarks
-        if self.mechanism.sketch:
-            remarks += sketch_distance_remarks(self, found.z)
-        if not (found.ties or found.is_cut_off or self.is_deflated):
-            return remarks
-        from planar.solving.assembly.sketch_remarks import sketch_remarks  # only where there is something to say
+    def remarks(self, assembly: Assembly) -> tuple[str, ...]:
+        """The remarks of the mechanism, and those on an assembly."""
+        return (*self.mechanism.remarks, *sketch_remarks(self, assembly))
 
-        return (*remarks, *sketch_remarks(self, BlockAssemblies(self), found))
+    def block_regularity(self, z: Array) -> Array:
+        """How regular the Jacobian of each block is at unknowns z (blocks,)."""
+        return regularity.regularity(self, regularity.jacobian_at(self, z, self.inputs.u))
 
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
         if self.acceptance is not None:
             return is_surely_regular(self, z)
-        from planar.solving.rates.regularity import jacobian_at, regularity
-
-        of_blocks = regularity(self, jacobian_at(self, z, self.inputs.u))
-        return bool(of_blocks.min(initial=1.0) >= MIN_FAST_REGULARITY)
+        return bool(self.block_regularity(z).min(initial=1.0) >= MIN_FAST_REGULARITY)
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""
-        if is_surely_regular(self, z):
-            return True
-        from planar.solving.rates.regularity import jacobian_at, regularity
-
-        return bool(np.all(regularity(self, jacobian_at(self, z, self.inputs.u)) >= MIN_REGULARITY))
+        return is_surely_regular(self, z) or bool(np.all(self.block_regularity(z) >= MIN_REGULARITY))
 
     def regularized(self, z: Array) -> tuple[PositionSolver, Array] | None:
         """A solver, and the unknowns, for constraints that are singular at z and all along the motion from there; None
         where they are not, or something is free."""
         if self.is_deflated:
             return None
-        from planar.solving.rates.regularity import jacobian_at, regularity
-
-        weak = regularity(self, jacobian_at(self, z, self.inputs.u)) < MIN_REGULARITY
+        weak = self.block_regularity(z) < MIN_REGULARITY
         if not weak.any():
             return None
         from planar.solving.deflation import deflate  # few mechanisms are of this kind
 
-        found = deflate(self, [stage for stage in self.equations.blocks if weak[stage.block_index]], z)
-        return found and (self.with_functions(found[0]), found[1])
+        deflated = deflate(self, [stage for stage in self.equations.blocks if weak[stage.block_index]], z)
+        return deflated and (self.with_functions(deflated[0]), deflated[1])
 
     def unassembled(self, failure: AssemblySearchFailure) -> NoAnswer:
         """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.rates.regularity import is_always_singular, jacobian_at, regularity
-
-        found = regularity(self, jacobian_at(self, failure.z, self.inputs.u))
+        block_regularity = self.block_regularity(failure.z)
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
-            if found[stage.block_index] < MIN_REGULARITY and is_always_singular(self, stage, failure.z):
+            is_weak = block_regularity[stage.block_index] < MIN_REGULARITY
+            if is_weak and regularity.is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
-        return (
-            refusals.too_many_inputs(self) if self._is_contradicted(failure) else refusals.not_assembled(self, failure)
-        )
+        if self._is_contradicted(failure):
+            return refusals.too_many_inputs(self)
+        return refusals.not_assembled(self, failure)
 
     def _is_contradicted(self, failure: AssemblySearchFailure) -> bool:
         """Whether what does not close is held more than once because the inputs are more than the pairs leave free.
@@ -199,135 +220,95 @@ class PositionSolver(PreparedMechanism):
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
-        found = self._fast_state(z, remarks) or self._examined_state(z, remarks)
+        fast = fast_position(self, z)
+        state = self._examined_state(z, remarks) if fast is None else self.fast_state(fast, remarks, self.mechanism)
         self.refuse_outside_stops(z)
-        return found
+        return state
 
     def is_inside_stops(self, z: Array) -> bool:
         """Whether no pair is beyond its stop."""
-        return self.stops is None or not self.stops.refusal_outside(self.stop_positions(z, self.inputs.u), "")
+        return self._stop_refusal(z) is None
 
     def refuse_outside_stops(self, z: Array) -> None:
         """Raise NoAnswer where a pair is beyond its stop."""
-        if self.stops is not None:
-            wrong = self.stops.refusal_outside(self.stop_positions(z, self.inputs.u), self.describe_position())
-            if wrong is not None:
-                raise wrong
+        refusal = self._stop_refusal(z)
+        if refusal is not None:
+            raise refusal
+
+    def _stop_refusal(self, z: Array) -> NoAnswer | None:
+        if self.stops is None:
+            return None
+        return self.stops.refusal_outside(self.stop_positions(z, self.inputs.u), self.describe_position())
 
     def _examined_state(self, z: Array, remarks: tuple[str, ...]) -> State:
         """The state by the general checks, which say why where there is none."""
-        from planar.solving.rates.sample_rates import sample_rates
-
-        gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
-        residual = float(gaps.max(initial=0.0))
+        residual, pair = self.worst_residual(z)
         if residual > self.tolerance:
-            raise self._open_refusal(z, residual, self.row_pairs[int(np.argmax(gaps))])
+            raise self._open_refusal(z, residual, pair)
         if self.equations.open_rows:
-            from planar.solving.assembly.least_misfit import refuse_misfit
-
-            refuse_misfit(self, z, self.inputs.u)
+            least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
         if not (self.functions.is_square and self._is_regular(z)):
-            judged = self._judged_mobility(z, remarks)
-            if isinstance(judged, State):
-                return judged
-            mobility = judged
-        rates = sample_rates(self, z[None], self._one_sample(), {}, False)
-        doubt = rates.doubts
-        if doubt is not None and doubt.errors.is_too_inexact[0]:
-            raise doubt.refusal(self, 0, self.describe_position())
-        remarks = (*remarks, doubt.remark()) if doubt else remarks
-        return self._checked_state([part[0] for part in rates.coordinate_rates], mobility, residual, remarks)
-
-    def _judged_mobility(self, z: Array, remarks: tuple[str, ...]) -> int | State:
-        """The mobility at a position; where the constraints are singular there the state, if they have rates all the
-        same. Raises NoAnswer."""
-        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
-
-        try:
-            return determined_mobility(self, z, self._kinematics_at_rest(z))
-        except (SingularPosition, NoAnswer) as problem:
-            regular = self.regularized(z)
+            mobility, refuse = judgement.judge_velocity(self, z)
+            regular = None if refuse is None else self.regularized(z)
             if regular is not None:
                 return regular[0].state(regular[1], remarks)
-            if not isinstance(problem, SingularPosition):
-                raise
-            from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
-
-            through = singular_rates(self, z)
-            state = through and self._singular_state(through, remarks)
-            if state is None:
-                raise problem.refusal() from None
-            return state
+            if refuse is not None:
+                state = self._singular_state(z, remarks) if mobility == self.inputs.u.size + 1 else None
+                if state is None:
+                    raise refuse()
+                return state
+        coordinate_rates, doubt = self._sample_rates(z, {})
+        if doubt is not None and doubt.errors.is_too_inexact[0]:
+            raise doubt.refusal(self, 0, self.describe_position())
+        if doubt is not None:
+            remarks = (*remarks, doubt.remark())
+        return self._checked_state([rates[0] for rates in coordinate_rates], mobility, residual, remarks)
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+        refuse = judgement.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
+        return refusals.not_closed(self, pair, residual) if refuse is None else refuse()
 
-        try:
-            if residual <= CLOSED_TOLERANCE:
-                determined_mobility(self, z, self._kinematics_at_rest(z))
-        except SingularPosition as singular:
-            return singular.refusal()
-        except NoAnswer as singular:
-            return singular
-        return refusals.not_closed(self, pair, residual)
+    def _sample_rates(self, z: Array, branch_rates: Mapping[int, BranchRates]) -> sample_rates.SampleRates:
+        """The rates at one sample."""
+        u, u1, u2 = (rates[None] for rates in self.inputs[:3])
+        inputs = run_samples.InputRates(u, u1, u2, 0.0 * u)
+        return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
 
-    def _kinematics_at_rest(self, z: Array) -> EquationRates:
-        """The rates of the constraints while the unknowns rest and the inputs move."""
-        s, rest = self.inputs, np.zeros_like(z)
-        y, y1, y2 = (np.concatenate(both) for both in ((z, s.u), (rest, s.u1), (rest, s.u2)))
-        return self.functions.kinematics(y, y1, y2, s.p)
-
-    def _one_sample(self) -> InputRates:
-        from planar.solving.continuation.run_samples import InputRates
-
-        s = self.inputs
-        return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
-
-    def _fast_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
-        """The state by the acceptance test alone, where that finds nothing to look at."""
-        found = fast_position(self, z)
-        return None if found is None else self.state_of(found, remarks, self.mechanism)
-
-    def state_of(self, found: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
+    def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
         """The state of a position that is surely sound, of a mechanism that may have other inputs."""
-        frames, own = lazy_frames(self, found.coordinate_rates.T)
-        return State(mechanism, len(self.inputs.u), found.residual, remarks, frames, own, self.shapes)
+        frames, own = lazy_frames(self, position.coordinate_rates)
+        return State(mechanism, len(self.inputs.u), position.residual, remarks, frames, own, self.shapes)
 
     def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
         """What to say of a motion that ends at inputs u, and went as far as a point."""
-        from planar.solving.diagnosis import refusals
-        from planar.solving.rates.regularity import moved_links
-
-        tangent = point.tangent
         if ending is TrackingEnd.STOP and self.stops is not None:
             met = self.stops.describe_met(self.stop_positions(point.y[:-1], u))
             return refusals.motion_stopped(self, met, self.describe_inputs(u))
-        return refusals.motion_ended(self, moved_links(self, tangent[:-1]), self.describe_inputs(u), ending)
+        return refusals.motion_ended(
+            self, regularity.moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending
+        )
 
-    def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
-        """The state where more than the inputs could move to first order, but only one motion goes on."""
-        s = self.inputs
-        residual = self.max_residual(rates.z, s.u)
-        if residual > self.tolerance:
+    def _singular_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
+        """The state where one more than the inputs could move to first order, if only one motion goes on."""
+        from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
+
+        s, rates = self.inputs, singular_rates(self, z)
+        if rates is None or (residual := self.max_residual(rates.z, s.u)) > self.tolerance:
             return None
         y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
-        told = "to first order there is one more motion here; the rates are those of the only one that goes on"
-        found = self.functions.kinematics(y, y1, y2, s.p)
-        return self._checked_state([found.w, found.w1, found.w2], s.u.size, residual, (*remarks, told))
+        note = "to first order there is one more motion here; the rates are those of the only one that goes on"
+        motion = self.functions.kinematics(y, y1, y2, s.p)
+        return self._checked_state([motion.w, motion.w1, motion.w2], s.u.size, residual, (*remarks, note))
 
     def state_on_branch(self, z: Array, local: BranchRates) -> State:
         """The state on a change point or beside it, with the rates of the branch that was followed there.
 
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
-        from planar.solving.rates.sample_rates import sample_rates
-
         residual = self.max_residual(z, self.inputs.u)
-        found = sample_rates(self, z[None], self._one_sample(), {0: local}, False)
-        rates = [part[0] for part in found.coordinate_rates]
+        rates = [part[0] for part in self._sample_rates(z, {0: local}).coordinate_rates]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
         return self._checked_state(rates, self.inputs.u.size, residual, ())
@@ -337,31 +318,25 @@ class PositionSolver(PreparedMechanism):
         w = self.coordinates(state.frames, state.own)
         return self.state(w[list(self.equations.unknowns)], state.remarks)
 
-    def refuse_open_contact(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> None:
-        """Raise NoAnswer where a contact is open that guides should keep closed."""
-        gap = self.residual_check.find_open_contact(frames, own)
-        if gap is not None:
-            from planar.solving.diagnosis import refusals
-
-            raise refusals.open_contact(self, *gap)
+    def refuse_open_contact(self, motion: Array) -> None:
+        """Raise NoAnswer where a contact is open that guides should keep closed; `motion` as of `stack_motion`."""
+        contact = self.structure.residual_check.find_open_contact(motion, self.inputs.p)
+        if contact is not None:
+            pair, gap = contact
+            raise refusals.open_contact(self, pair, gap * self.unit)
 
     def _checked_state(
         self, coordinate_rates: Sequence[Array], mobility: int, residual: float, remarks: tuple[str, ...]
     ) -> State:
-        parts = np.stack(coordinate_rates, axis=1) * self.scale[:, None]
-        frames, own = frames_from_coordinates(
-            [Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs
-        )
-        gaps = self.residual_check.rate_residuals(frames, own)
-        for (gap, pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
-            if float(np.max(gap)) > 1e3 * self.tolerance:
-                from planar.solving.diagnosis import refusals
-
+        motion = stack_motion([w[None] for w in coordinate_rates], [u[None] for u in self.inputs[:3]])
+        gaps = self.structure.residual_check.rate_residuals(motion, self.inputs.p)
+        for ((gap,), pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
+            if gap > 1e3 * self.tolerance:
                 if self.inputs.u.size > mobility:
                     raise refusals.disagreeing_inputs(self, mobility, what)
-                raise refusals.broken_rates(self, what, pair, float(np.max(gap)))
-        self.refuse_open_contact(frames, own)
-        return State(self.mechanism, mobility, residual, remarks, frames, own, self.shapes)
+                raise refusals.broken_rates(self, what, pair, float(gap))
+        self.refuse_open_contact(motion)
+        return State(self.mechanism, mobility, residual, remarks, *lazy_frames(self, coordinate_rates), self.shapes)
 
 
 class SolvedMechanism:
@@ -370,7 +345,8 @@ class SolvedMechanism:
     def __init__(self, mechanism: Mechanism):
         self.plain_solver = PositionSolver(mechanism)
         "by the constraints of the pairs alone"
-        self._judgements: dict[str | None, NoAnswer | None] = {}
+        self._refusals_at_rest: dict[str | None, NoAnswer | None] = {}
+        "of a mechanism without rates: why the input at a pair cannot run"
         self.range_ends: dict[Any, Any] = {}
         "the ends of the ranges of its inputs"
 
@@ -382,19 +358,19 @@ class SolvedMechanism:
     @property
     def assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
-        found = self._start[1]
-        if isinstance(found, Assembly):
-            self.solver.refuse_outside_stops(found.z)
-            return found
+        assembly = self._start[1]
+        if isinstance(assembly, Assembly):
+            self.solver.refuse_outside_stops(assembly.z)
+            return assembly
         raise self._refusal.with_traceback(None)
 
     @cached_property
     def _refusal(self) -> NoAnswer:
         """Why there is no assembly: looked for only where somebody asks."""
-        found = self._start[1]
-        if isinstance(found, NoAnswer):
-            return found
-        return self.plain_solver.unassembled(found)  # type: ignore[arg-type]  # an assembly is not refused
+        failure = self._start[1]
+        if isinstance(failure, NoAnswer):
+            return failure
+        return self.plain_solver.unassembled(failure)  # type: ignore[arg-type]  # an assembly is not refused
 
     @cached_property
     def nearest(self) -> Assembly | AssemblySearchFailure | NoAnswer:
@@ -406,20 +382,20 @@ class SolvedMechanism:
 
     @cached_property
     def _start(self) -> tuple[PositionSolver, Assembly | AssemblySearchFailure | NoAnswer]:
-        solver, found = self.plain_solver, self.nearest
-        if not isinstance(found, Assembly):
-            return solver, found
-        regular = None if is_surely_regular(solver, found.z) else solver.regularized(found.z)
+        solver, assembly = self.plain_solver, self.nearest
+        if not isinstance(assembly, Assembly):
+            return solver, assembly
+        regular = None if is_surely_regular(solver, assembly.z) else solver.regularized(assembly.z)
         if regular is not None:
-            solver, found = regular[0], found._replace(z=regular[1])
-        found.z.flags.writeable = False
+            solver, assembly = regular[0], assembly._replace(z=regular[1])
+        assembly.z.flags.writeable = False
         if solver.stops is not None:
-            solver.stops.initial_turns = solver.stops.turns(solver.stop_positions(found.z, solver.inputs.u))
-        return solver, found
+            solver.stops.initial_turns = solver.stops.turns(solver.stop_positions(assembly.z, solver.inputs.u))
+        return solver, assembly
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """What there is to say of it."""
+        """The remarks of the mechanism, and those on its assembly."""
         return self.solver.remarks(self.assembly)
 
     @cached_property
@@ -464,22 +440,11 @@ class SolvedMechanism:
             return None  # regular positions need no judgement
         inputs = tuple(Input(given.pair, given.position) for given in mechanism.inputs)
         # rates, loads and remarks make no difference to the judgement, nor to the assembly
-        at_rest = solved_mechanism(replace(mechanism, inputs=inputs, remarks=(), loads=()))
-        at_rest._share_start(self)
-        return at_rest._judgement(pair)
-
-    def _share_start(self, other: SolvedMechanism) -> None:
-        """Take the start of the same mechanism with other rates, where this one has none yet."""
-        if "_start" not in self.__dict__:
-            self.__dict__["_start"] = other.solver.with_inputs_of(self.plain_solver.mechanism), other._start[1]
-
-    def _judgement(self, pair: str | None) -> NoAnswer | None:
-        """Why an input of this mechanism at rest cannot run; None where one can."""
-        if pair not in self._judgements:
-            from planar.solving.diagnosis.judgement import judge_motion  # few mechanisms are judged
-
-            self._judgements[pair] = judge_motion(self.solver, self.assembly.z, pair)
-        return self._judgements[pair]
+        at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
+        refusals_at_rest = solved_mechanism(at_rest)._refusals_at_rest
+        if pair not in refusals_at_rest:
+            refusals_at_rest[pair] = judgement.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
+        return refusals_at_rest[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
         """What to say where rates are not determined since nothing can move; None where something can."""

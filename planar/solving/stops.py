@@ -47,9 +47,9 @@ class PairStops:
         motions = relative_motions(mechanism)
         counting = links_counting_turns(mechanism)
         self.mechanism, self.motions = mechanism, motions
-        self.pairs = tuple(motions[each.pair] for each in mechanism.stops)
-        self.low = np.array([-np.inf if each.low is None else each.low for each in mechanism.stops])
-        self.high = np.array([np.inf if each.high is None else each.high for each in mechanism.stops])
+        self.pairs = tuple(motions[stop.pair] for stop in mechanism.stops)
+        self.low = np.array([-np.inf if stop.low is None else stop.low for stop in mechanism.stops])
+        self.high = np.array([np.inf if stop.high is None else stop.high for stop in mechanism.stops])
         self.scale = np.array([size if pair.input_kind is MeasureKind.LENGTH else 1.0 for pair in self.pairs])
         self.is_periodic = np.array(
             [pair.input_kind is MeasureKind.ANGLE and not counting.issuperset(pair.links) for pair in self.pairs]
@@ -65,33 +65,25 @@ class PairStops:
         self, shapes: Mapping[str, LinkShape], frames: Mapping[str, Frame], own: Mapping[str, Sequence[Any]]
     ) -> Array:
         """The positions of the pairs that have stops (stops,); (stops, rows) where frames are arrays."""
-        found = [value_and_rates(pair.input_position_at(shapes, frames, own))[0] for pair in self.pairs]
-        return np.array(np.broadcast_arrays(*found), dtype=float)
+        positions = [value_and_rates(pair.input_position_at(shapes, frames, own))[0] for pair in self.pairs]
+        return np.array(np.broadcast_arrays(*positions), dtype=float)
 
     def turns(self, positions: Array) -> Array:
         """Whole turns (rad) to add to positions (stops,) so that they lie between their stops; as few as can be, or
         those of the mechanism's own assembly where these do."""
-        found = np.zeros(len(positions))
-        for k in np.flatnonzero(self.is_periodic):
-            room, kept = STOP_TOLERANCE, None if self.initial_turns is None else float(self.initial_turns[k])
-            low, high, at = self.low[k] - room, self.high[k] + room, float(positions[k])
-            if kept is not None and low <= at + kept <= high:
-                found[k] = kept
-                continue
-            if at < low:
-                more = TURN * np.ceil((low - at) / TURN)
-            elif at > high:
-                more = -TURN * np.ceil((at - high) / TURN)
-            else:
-                continue
-            if low <= at + more <= high:
-                found[k] = more
-        return found
+        low, high = self.low - STOP_TOLERANCE, self.high + STOP_TOLERANCE
+        up, down = TURN * np.ceil((low - positions) / TURN), TURN * np.ceil((positions - high) / TURN)
+        turns: Array = np.zeros(len(positions))
+        for choice in (np.where(positions < low, up, np.where(positions > high, -down, 0.0)), self.initial_turns):
+            if choice is not None:
+                is_inside = (low <= positions + choice) & (positions + choice <= high)
+                turns = np.where(self.is_periodic & is_inside, choice, turns)
+        return turns
 
     def rooms(self, positions: Array, turns: Array | None = None) -> Array:
         """How far positions (stops,) are from their lower and upper stops (2, stops), rad or sizes; negative beyond."""
-        at = positions + (self.turns(positions) if turns is None else turns)
-        return np.array([at - self.low, self.high - at]) / self.scale
+        turned = positions + (self.turns(positions) if turns is None else turns)
+        return np.array([turned - self.low, self.high - turned]) / self.scale
 
     def sure_rows(self, positions: Array, z: Array) -> BoolArray:
         """Which rows of a run surely come before any stop (rows,): positions (stops, rows), unknowns (rows, unknowns).
@@ -99,23 +91,22 @@ class PairStops:
         Between two rows a smooth motion leaves the stretch between them by an eighth of its second difference; eight
         times that is allowed for, and rows that are far apart are not judged.
         """
-        many = positions.shape[1]
-        if many < MIN_SURE_ROWS:
-            return np.zeros(many, dtype=bool)
-        at = (positions + self.turns(positions[:, 0])[:, None]) / self.scale[:, None]
-        low, high = (each[:, None] / self.scale[:, None] for each in (self.low, self.high))
-        room = np.minimum(at - low, high - at)
-        bend = np.abs(np.diff(at, 2, axis=1))
-        beside = np.pad(bend, ((0, 0), (1, 1)), mode="edge")
-        steps = np.maximum(beside[:, :-1], beside[:, 1:])
+        row_count = positions.shape[1]
+        if row_count < MIN_SURE_ROWS:
+            return np.zeros(row_count, dtype=bool)
+        scaled = (positions + self.turns(positions[:, 0])[:, None]) / self.scale[:, None]
+        low, high = ((limit / self.scale)[:, None] for limit in (self.low, self.high))
+        room = np.minimum(scaled - low, high - scaled)
+        second_differences = np.pad(np.abs(np.diff(scaled, 2, axis=1)), ((0, 0), (1, 1)), mode="edge")
+        steps = np.maximum(second_differences[:, :-1], second_differences[:, 1:])
         clear = np.minimum(room[:, :-1], room[:, 1:]) > steps + STOP_TOLERANCE
         near = np.abs(np.diff(z, axis=0)).max(axis=1, initial=0.0) <= MAX_SURE_MOVE
         return np.append(room[:, 0].min() > STOP_TOLERANCE, clear.all(axis=0) & near)
 
     def side(self, is_upper: bool, index: int) -> MetStop:
         """One stop."""
-        each = self.mechanism.stops[index]
-        return MetStop(each.pair, float((self.high if is_upper else self.low)[index]), bool(is_upper), each.restitution)
+        stop = self.mechanism.stops[index]
+        return MetStop(stop.pair, float((self.high if is_upper else self.low)[index]), bool(is_upper), stop.restitution)
 
     def met_at(self, positions: Array) -> tuple[MetStop, ...]:
         """The stops at which positions (stops,) are, or beyond which."""
@@ -124,8 +115,7 @@ class PairStops:
 
     def describe_met(self, positions: Array) -> str:
         """The stops that are met, in words."""
-        met = self.met_at(positions)
-        return join_names([each.describe(self.motions, self.mechanism.units) for each in met])
+        return join_names([stop.describe(self.motions, self.mechanism.units) for stop in self.met_at(positions)])
 
     def refusal_outside(self, positions: Array, where: str) -> NoAnswer | None:
         """What to say of a position that lies outside of stops; None of one that does not."""
@@ -135,16 +125,16 @@ class PairStops:
             return None
         k, units = int(beyond[np.argmin(rooms.min(axis=0)[beyond])]), self.mechanism.units
         kind = self.pairs[k].input_quantity_kinds()[0]
-        low, high = (amount(float(each), kind, units) for each in (self.low[k], self.high[k]))
+        low, high = (amount(float(limit), kind, units) for limit in (self.low[k], self.high[k]))
         if not np.isfinite(self.low[k]):
-            allowed, way = f"its stop at {high}", "above"
+            allowed, side = f"its stop at {high}", "above"
         elif not np.isfinite(self.high[k]):
-            allowed, way = f"its stop at {low}", "below"
+            allowed, side = f"its stop at {low}", "below"
         else:
-            allowed, way = f"its stops at {low} and {high}", "outside of"
-        name, at = self.pairs[k].name, amount(float(positions[k]), kind, units)
+            allowed, side = f"its stops at {low} and {high}", "outside of"
+        name, position = self.pairs[k].name, amount(float(positions[k]), kind, units)
         return NoAnswer(
             Outcome.STOP,
-            f"{where} pair {name!r} is at {at}, {way} {allowed}; move the input, let the sketch choose another "
+            f"{where} pair {name!r} is at {position}, {side} {allowed}; move the input, let the sketch choose another "
             f"assembly, or move the stop",
         )

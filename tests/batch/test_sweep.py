@@ -197,7 +197,7 @@ def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     z[0, 1] += 1e-9
     p[-1, 2] += 1e-9
     w = solver.functions.coordinates(z.T, u.T, p.T).T
-    left = DesignResidualCheck(solver.residual_check, solver.mechanism, solver.functions, p).worst_residual(w, u)
+    left = DesignResidualCheck(solver.mechanism, solver.functions, p).worst_residual(w, u)
     assert (left <= solver.tolerance).tolist() == [True, False, False]
 
 

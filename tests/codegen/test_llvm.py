@@ -21,6 +21,7 @@ from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.foundation.recorded_formula import formula_of_results
 from planar.model.mechanism import named_points
+from planar.solving.position import PositionSolver
 from tests.builders import designs_around
 from tests.draws import first_cases, part
 from tests.known import MODELS
@@ -33,18 +34,18 @@ PART = slice(30, 331)
 
 def arguments(motion, points):
     """A run of a motion's rows as a batch of one design."""
-    course = motion.course
-    solver, found = course.ranged.solver, course.found
+    solver = PositionSolver(motion.mechanism)
     named = {each.name: each.members[0] for each in named_points(motion.mechanism)}
     members = [named[point] for point in points]
-    u = found.inputs.u[PART]
+    positions = [motion.inputs[driven.pair].position[PART] for driven in motion.mechanism.inputs]
+    u = np.stack(positions, axis=1) / solver.input_scale
     places = [solver.shapes[link].position(name) for link, name in members]
     return DesignBatch(
         solver.functions,
         motion.mechanism,
         solver.inputs.p[:, None],
         np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
-        found.z[PART][0][:, None],
+        motion.course.unknowns[PART][0][:, None],
         u - u[0],
         u[0][:, None],
         solver.inputs.u1[:, None],

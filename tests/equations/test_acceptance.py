@@ -8,9 +8,8 @@ from planar.equations.block_motion import LargeBlockMotion
 from planar.equations.block_types import block_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
-from planar.foundation.jets import Jet
 from planar.model.pairs import pair_types
-from planar.solving.lazy_frames import lazy_frames
+from planar.solving.checks.residual_check import stack_motion
 from planar.solving.position import solved_mechanism
 from tests.known import MODELS
 
@@ -64,24 +63,13 @@ def test_what_is_open_and_rates_that_are_wrong_are_judged_as_the_general_check_j
     wrong = run.coordinate_rates + 1e-5 * rng.uniform(-1.0, 1.0, run.coordinate_rates.shape)
     motion = np.concatenate([wrong.transpose(1, 2, 0), np.array([part.T for part in given])], axis=1)
     residual, _, velocity_error, acceleration_error, _ = functions.check.judge(motion, solver.inputs.p)
-    frames, own = lazy_frames(solver, list(wrong.transpose(1, 0, 2)))
-    inputs = [Jet(*(part[:, k] * solver._input_scale[k] for part in given)) for k in range(given.u.shape[1])]
-    open_now = solver.residual_check.residuals(
-        {name: plain(frame) for name, frame in frames.items()},
-        {name: [jet.parts[0] for jet in values] for name, values in own.items()},
-        np.array([jet.parts[0] for jet in inputs]),
-    )
+    check = solver.structure.residual_check
+    np.testing.assert_array_equal(stack_motion(wrong.transpose(1, 0, 2), given), motion)
+    open_now = solver.coordinate_residuals(wrong[:, 0], given.u)
     np.testing.assert_allclose(residual, open_now.max(axis=0), rtol=1e-6)
-    errors = solver.residual_check.rate_residuals(frames, own, inputs)
+    errors = check.rate_residuals(motion, solver.inputs.p)
     for error, (gaps, _) in zip((velocity_error, acceleration_error), errors, strict=True):
         np.testing.assert_allclose(error, gaps, rtol=1e-6)
-
-
-def plain(frame):
-    """A frame of jets at rest."""
-    return frame._replace(
-        **{part: value.parts[0] for part in frame._fields[:5] if isinstance(value := getattr(frame, part), Jet)}
-    )
 
 
 @pytest.mark.parametrize("stem", STEMS)

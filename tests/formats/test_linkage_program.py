@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.model.mechanism import curved_slots
 from planar.reports.files.converted import written_text
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 from tests.foreign_samples import linkage2
 from tests.round_trips import read_document, read_text
 

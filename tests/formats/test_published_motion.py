@@ -10,7 +10,7 @@ import pytest
 
 import planar
 from planar.model.mechanism import Drive
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 from tests.round_trips import read_text
 
 FOLDER = os.environ.get("PLANAR_PEER_FILES")

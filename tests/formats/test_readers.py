@@ -9,7 +9,7 @@ import pytest
 import planar
 from planar.formats.known_formats import file_formats
 from planar.model.mechanism import Drive, Input
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 from tests.foreign_samples import (
     FOUR_BARS,
     LINKAGE_SIM,

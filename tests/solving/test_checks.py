@@ -133,12 +133,11 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
 
 def test_residual_is_judged_with_cos_and_sin_made_afresh_from_the_angle(solver):
     """A program that carries a wrong sine beside the right angle closes its own equations, not the gate's."""
-    frames, own = solver.state(solver.find_assembly().z).frames, dict.fromkeys(solver.pairs, ())
-    still = {n: f if f.fixed else type(f)(*(x.parts[0] for x in f[:5])) for n, f in frames.items()}
-    assert solver.residual_check.residuals(still, own).max() < solver.tolerance
-    bent = still["BC"]
-    still["BC"] = bent._replace(angle=bent.angle + 0.1)
-    assert solver.residual_check.residuals(still, own).max() > 0.01
+    state, u = solver.state(solver.find_assembly().z), solver.inputs.u[None]
+    assert solver.coordinate_residuals(solver.coordinates(state.frames, state.own)[None], u).max() < solver.tolerance
+    bent = state.frames["BC"]._replace(angle=state.frames["BC"].angle + 0.1)
+    w = solver.coordinates(state.frames | {"BC": bent}, state.own)
+    assert solver.coordinate_residuals(w[None], u).max() > 0.01
 
 
 def test_a_move_is_allowed_if_the_rates_at_its_ends_explain_it():

@@ -42,7 +42,8 @@ def test_unloaded_pins_press_on_each_other_by_their_misfits():
 
 def test_the_position_is_that_of_least_squares_by_another_route():
     mechanism = three_cranks()
-    state, check = planar.solve(mechanism), PositionSolver(mechanism).residual_check
+    state, solver = planar.solve(mechanism), PositionSolver(mechanism)
+    numbers = {pair.name: pair.measure([solver.shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
     names = [name for name in state.frames if name != mechanism.frame]
     own = {pair.name: () for pair in mechanism.pairs}
 
@@ -50,7 +51,7 @@ def test_the_position_is_that_of_least_squares_by_another_route():
         frames = {mechanism.frame: GROUND} | {
             name: frame_at(*each) for name, each in zip(names, q.reshape(-1, 3), strict=True)
         }
-        values = residuals(mechanism, frames, check.numbers, own, [mechanism.inputs[0].position])
+        values = residuals(mechanism, frames, numbers, own, [mechanism.inputs[0].position])
         found = 1e3 * np.array([float(value) for _, value in values])
         found[-1] *= 1e6  # the input is held
         return found

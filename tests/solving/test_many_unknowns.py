@@ -14,7 +14,7 @@ from planar.equations.functions import equation_functions
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
 from planar.foundation.errors import NoAnswer
 from planar.foundation.private_cache import disable_cache
-from planar.solving import full_constraints, position, structure
+from planar.solving import full_constraints, position, prepared_mechanism
 from planar.solving.continuation.bordered_jacobian import BorderedJacobian, closing_step
 from tests.builders import lift_document
 from tests.draws import first_cases
@@ -33,7 +33,7 @@ CURVES = [
 
 
 def clear_structures():
-    for module in (functions, acceptance, structure, position):
+    for module in (functions, acceptance, prepared_mechanism, position):
         for each in vars(module).values():
             if hasattr(each, "cache_clear"):
                 each.cache_clear()

@@ -120,7 +120,7 @@ def test_wrong_rates_of_a_block_type_do_not_pass(order, monkeypatch):
     monkeypatch.setattr(block_type_functions, "known_text", lambda _: None)
     monkeypatch.setattr(acceptance, "block_type_functions", block_type_functions.BlockTypeFunctions)
     wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, EquationFunctions(solver.equations))
-    monkeypatch.setattr(solver.structure, "_acceptance", wrong)
+    monkeypatch.setattr(solver.structure, "acceptance", wrong)
     assert fast_position(solver, z) is None
     s = solver.inputs
     _, told = wrong.position(z, acceptance.InputSamples(s.u, s.u1, s.u2), solver.acceptance_scales)

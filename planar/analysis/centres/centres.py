@@ -40,7 +40,7 @@ from planar.foundation.time_limit import stop_if_over, stops_in_time
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, check_link_count, named_points
 from planar.results.motion import State
-from planar.solving.rest_position import rest_position
+from planar.solving.position import rest_position
 
 MAX_ERROR_AT_CROSSING = 1e-9
 """Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""

@@ -12,12 +12,11 @@ from planar.batch.march.prediction import LEAST_START_REGULARITY, least_regulari
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions, EquationRates
 from planar.equations.linear import solve_arrays, solve_vectors
-from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.symbolic_equations import ConstraintEquations
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
+from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck, stack_motion
 
 Array = np.ndarray
 
@@ -89,10 +88,9 @@ def column_volume(jacobians: Array) -> Array:
 class DesignResidualCheck:
     """The residual check, for designs each with its own p (numbers, designs), in units of the size."""
 
-    def __init__(self, residual_check: ResidualCheck, mechanism: Mechanism, functions: EquationFunctions, p: Array):
-        self.mechanism, self.functions = mechanism, functions
-        self.residual_check = residual_check.of_designs(p)
-        self.column = coordinate_columns(functions.equations.coordinates)
+    def __init__(self, mechanism: Mechanism, functions: EquationFunctions, p: Array):
+        self.p, self.column = p, coordinate_columns(functions.equations.coordinates)
+        self.residual_check = ResidualCheck(mechanism, self.column)
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
 
@@ -108,9 +106,13 @@ class DesignResidualCheck:
 
     def worst_residual(self, w: Array, u: Array) -> Array:
         """What the worst constraint leaves open (designs,); w (coordinates, designs), u (inputs, designs)."""
-        frames, own = self.frames_from_coordinates(w)
-        gaps = self.residual_check.residuals(frames, own, u)
-        return np.broadcast_to(gaps.max(axis=0, initial=0.0), w.shape[1:] or u.shape[1:])
+        return self.residual_check.residuals(stack_motion([w.T], [u.T]), self.p).max(axis=0, initial=0.0)
+
+    def worst_rate_residuals(self, w: Sequence[Array], u: Sequence[Array]) -> list[Array]:
+        """How far velocities, then accelerations, break the worst constraint (designs,); w (designs, coordinates) and u
+        (inputs, designs) with their first and second rates."""
+        motion = stack_motion(w, [rates.T for rates in u])
+        return [worst for worst, _ in self.residual_check.rate_residuals(motion, self.p)]
 
 
 class DesignsAtStep(NamedTuple):
@@ -126,13 +128,7 @@ class DesignsAtStep(NamedTuple):
 
 def make_residual_check(batch: DesignBatch) -> DesignResidualCheck:
     """The residual check for a march."""
-    own = shapes_of_links(batch.mechanism)
-    return DesignResidualCheck(
-        ResidualCheck(batch.mechanism, own, mechanism_size(batch.mechanism, own)),
-        batch.mechanism,
-        batch.functions,
-        batch.p,
-    )
+    return DesignResidualCheck(batch.mechanism, batch.functions, batch.p)
 
 
 def design_positions(functions: DesignFunctions, batch: DesignBatch, z: Array, u: Array) -> DesignsAtStep:
@@ -177,10 +173,8 @@ class PointWriter:
         found = self._rates(row)
         w = [Jet(*(np.ascontiguousarray(part[:, k]) for part in found)) for k in range(found[0].shape[1])]
         self._write_points(out, w)
-        frames, own = self.residual_check.frames_from_coordinates(w)
-        inputs = [Jet(u, u1, u2) for u, u1, u2 in zip(row.u, batch.u1, batch.u2, strict=True)]
-        gaps = self.residual_check.residual_check.rate_residuals(frames, own, inputs)
-        return np.all([np.broadcast_to(gap, row.passed.shape) <= 1e3 * batch.tolerance for gap, _ in gaps], axis=0)
+        gaps = self.residual_check.worst_rate_residuals(found, (row.u, batch.u1, batch.u2))
+        return np.all([gap <= 1e3 * batch.tolerance for gap in gaps], axis=0)
 
     def _rates(self, row: DesignsAtStep) -> tuple[Array, Array, Array]:
         """w with its first and second rates, each (designs, coordinates)."""

@@ -105,7 +105,7 @@ def centres(  # many: options of the command
     from planar.analysis.centres.centres import centres as all_centres
     from planar.analysis.centres.centres import chosen_links
     from planar.reports.tables.centres import record, table
-    from planar.solving.rest_position import rest_position
+    from planar.solving.position import rest_position
 
     if as_json and output is not None:
         raise BadInput("-o", "the table goes to a file or SI values are printed with --json; give one of the two")

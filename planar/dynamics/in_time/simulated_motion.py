@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
@@ -50,6 +49,6 @@ def simulated_motion(
         time=time,
     )
     u = np.array([each.position for each in inputs.values()]).reshape(len(inputs), len(time))
-    still = {name: [each.parts[0] for each in values] for name, values in own.items()}
-    gaps = PositionSolver(mechanism).residual_check.residuals(KinematicArrays(motion).frames, still, u)
+    solver = PositionSolver(mechanism)
+    gaps = solver.coordinate_residuals(solver.coordinates(frames, own), u.T / solver.input_scale)
     return replace(motion, residual=float(np.max(gaps, initial=0.0)))

@@ -40,8 +40,7 @@ from planar.pages.data.stop_data import stop_data, stop_position_function
 from planar.pages.data.tolerance_data import tolerance_data
 from planar.pages.data.unit_data import unit_choices, unit_data
 from planar.pages.javascript import write_javascript
-from planar.solving.position import PositionSolver, solve, solved_mechanism
-from planar.solving.rest_position import rest_position
+from planar.solving.position import PositionSolver, rest_position, solve, solved_mechanism
 
 MAX_DIMENSION_RATIO, MIN_DIMENSION_RATIO = 2.0, 0.25
 """By what a dimension can be changed on a page: from a quarter of it to twice as much."""

@@ -19,7 +19,6 @@ from planar.model.pairs.cams.lift_law import rise_motions
 from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.pages.data.page_data import page_data
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
-from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver, solved_mechanism
 
@@ -90,11 +89,7 @@ def loose_links(mechanism: Mechanism) -> list[str]:
         place = closed_position(known, constraints)
     except NoAnswer:
         return []
-    drives = tuple(given.pair for given in mechanism.inputs)
-    rows = [constraints.jacobian(place)]
-    if drives:
-        rows.append(constraints.relative_jacobian(drives, place))
-    free = null_space(np.vstack(rows))
+    free = constraints.free_motions(place, tuple(given.pair for given in mechanism.inputs))
     names = {link.name for link in mechanism.links}
     moved = np.abs(free).max(axis=1, initial=0.0) > LOOSE_TOLERANCE
     return list(

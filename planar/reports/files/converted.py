@@ -86,7 +86,7 @@ def _format_of(target: str | os.PathLike[str] | None) -> str:
 def written_text(mechanism: Mechanism, name: str) -> WrittenText:
     """The mechanism where its inputs stand as another program's text."""
     from planar.formats.drawn.drawn_mechanism import drawn_mechanism
-    from planar.solving.rest_position import rest_position
+    from planar.solving.position import rest_position
 
     kind = named_format(name, OWN_FORMAT)
     if kind.write is None:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
-from planar.equations.functions import EquationFunctions
 from planar.equations.rank_conditions import constraint_dependencies
+from planar.equations.residuals import split_pair_numbers
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
-from planar.model.pairs import MeasureKind
-from planar.solving.assembly.sketch_start import turn_between
-from planar.solving.newton import CLOSED_TOLERANCE, NewtonResult, ResidualFunction, damped_newton, polish_root
+from planar.model.link_shapes import fitted_frame
+from planar.solving.newton import (
+    CLOSED_TOLERANCE,
+    NewtonResult,
+    ResidualFunction,
+    block_residual_function,
+    damped_newton,
+    polish_root,
+)
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 SAME_ASSEMBLY_TOLERANCE = 1e-6
@@ -50,9 +56,9 @@ def block_dependencies(setup: PreparedMechanism) -> list[frozenset[int]]:
 class BlockAssembly(NamedTuple):
     """One assembly of a block: all unknowns with this block's filled in, and how it lies.
 
-    `distance`: squared distance to the sketch of the points that the block places (sizes squared); `behind`: how many
-    slides are not ahead of their `through`; `height`: mean y of the block's points; `far`: how far its slides are ahead
-    together.
+    `distance`: squared distance to the sketch of the points that the block places (sizes squared); `slides_behind`: how
+    many slides are not ahead of their `through`; `height`: mean y of the block's points; `slides_ahead`: how far its
+    slides are ahead together.
     """
 
     z: Array
@@ -68,12 +74,26 @@ def is_out_of_reach(coalescence: Scalar) -> Scalar:
     return (coalescence > 2.0 - MEETING_COSINE_SQUARED) & (coalescence < np.inf)
 
 
+def closed_form_roots(setup: PreparedMechanism, stage: Block, z: Array) -> Sequence[Array] | None:
+    """The unknowns of the two assemblies of a block in closed form, always in the same order, none where it is out of
+    reach; None where it has no closed form, or the two all but meet."""
+    function = setup.functions.block_assemblies(stage)
+    if function is None:
+        return None
+    roots, residual, coalescence = function(z, setup.inputs.u, setup.inputs.p)
+    if is_out_of_reach(coalescence):
+        return []
+    # what is not a number is not below anything
+    return roots if coalescence < MEETING_COSINE_SQUARED and residual <= CLOSED_TOLERANCE else None
+
+
 class BlockAssemblies:
     """Assemblies of the blocks of one mechanism, at its own inputs."""
 
-    def __init__(self, setup: PreparedMechanism, misfit: float = 0.0):
-        """`misfit` (sizes) is what blocks with more rows than unknowns may leave open."""
-        self.misfit = misfit
+    def __init__(self, setup: PreparedMechanism, misfit: float = 0.0, spend: Callable[[float], None] | None = None):
+        """`misfit` (sizes) is what blocks with more rows than unknowns may leave open; `spend` is called with the
+        effort of each computation, and may raise an exception."""
+        self.misfit, self._spend = misfit, spend
         self.effort = 0.0
         "steps of Newton's method taken so far, and what else was computed, counted in such steps"
         self.repeated_effort = 0.0
@@ -84,10 +104,7 @@ class BlockAssemblies:
         self.setup = setup
         self.functions, self.u, self.p = setup.functions, setup.inputs.u, setup.inputs.p
         self.equations, self.pairs, self.column = setup.equations, setup.pairs, setup.column
-        self.numbers, first = {}, 0
-        for pair in mechanism.pairs:
-            self.numbers[pair.name] = self.p[first : first + len(pair.number_kinds)].tolist()
-            first += len(pair.number_kinds)
+        self.numbers = split_pair_numbers(mechanism.pairs, self.p.tolist())
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
             for name, shape in setup.shapes.items()
@@ -95,7 +112,7 @@ class BlockAssemblies:
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
         self.counts_turns = setup.structure.counts
         # each point by the first of its links to be placed, and the points of each link
-        self.first_link, self.points_of, _ = setup.structure.point_locations
+        self.first_link, self.points_of = setup.structure.point_locations
         self.sketched_by_level: dict[int, list[str]] = {}
         for name in self.sketch:
             self.sketched_by_level.setdefault(self.first_link[name][0], []).append(name)
@@ -118,88 +135,71 @@ class BlockAssemblies:
             return both, both[0].z
         if both is not None and not needs_nearest:
             return [], z
-        closing = self.residual_function(stage, z, self.p)
-        near, shown = self._starts_near_sketch(stage, z)
-        if both is not None:
-            # nothing closes the block: the starts near the sketch show where it is nearest to that
-            ended = self._solve_from(closing, self._with_lengths(stage, closing, near))
-            return [], self._best_end(stage, z, ended)
-        tolerance = self._tolerance(stage)
-        ended = self._solve_from(closing, self._with_lengths(stage, closing, near), tolerance)
-        found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
+        closing = block_residual_function(self.functions, stage, z, self.u, self.p)
+        near, is_shown = self._starts_near_sketch(stage, z)
+        unknowns = slice_length(stage.unknowns)
+        is_redundant = slice_length(stage.rows) > unknowns
+        # out of reach of a closed form nothing closes: the starts near the sketch show where the block is nearest to it
+        tolerance = max(CLOSED_TOLERANCE, self.misfit if is_redundant and both is None else 0.0)
+        ends = self._solve_from(stage, closing, near, tolerance)
+        assemblies = [] if both is not None else self._from_converged(stage, z, closing, ends)
         sketched = len(self.sketched_by_level.get(stage.block_index, ()))
         lower = all(self.pairs[name].is_lower_pair for name in stage.pairs)
-        dyad = (
-            slice_length(stage.unknowns) == 2 and len(stage.pairs) == 3 and lower and len(found) == 2
-        )  # there is no third
-        clear = (
+        is_dyad = unknowns == 2 and len(stage.pairs) == 3 and lower and len(assemblies) == 2  # there is no third
+        is_clear = (
             not every
-            and shown
-            and found
-            and min(each.distance for each in found) <= sketched * CLEAR_SKETCH_DISTANCE**2
+            and is_shown
+            and min((each.distance for each in assemblies), default=np.inf) <= sketched * CLEAR_SKETCH_DISTANCE**2
         )
-        if not (dyad or clear):
-            for starts in self._start_batches(stage, closing):
-                more = self._solve_from(closing, starts, tolerance)
-                ended = ended.joined(more)
+        if both is None and not (is_dyad or is_clear):
+            # all over the circles; of a large block in batches, since any assembly will do without a sketch
+            starts = _spread_angles(unknowns)
+            batch = len(starts) if unknowns < LARGE_BLOCK else START_BATCH
+            for first in range(0, len(starts), batch):
+                more = self._solve_from(stage, closing, starts[first : first + batch], tolerance)
+                ends = ends.joined(more)
                 if not sketched and np.any(more.converged):
                     break
-            found = self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
-        return found, self._best_end(stage, z, ended)
+            assemblies = self._from_converged(stage, z, closing, ends)
+        nearest = z.copy()
+        nearest[stage.unknowns] = ends.unknowns[int(np.argmin(ends.residual))]
+        return assemblies, nearest
 
     def _count_effort(self, steps: float) -> None:
         """Add to `effort`, and to `repeated_effort` where the block was solved before."""
         self.effort += steps
         if self._is_repeated:
             self.repeated_effort += steps
+        if self._spend is not None:
+            self._spend(steps)
 
     def _solve_from(
-        self, closing: ResidualFunction, starts: Array, tolerance: float = CLOSED_TOLERANCE
+        self, stage: Block, closing: ResidualFunction, starts: Array, tolerance: float = CLOSED_TOLERANCE
     ) -> NewtonResult:
+        """Where starts (starts, unknowns) lead whose angles are given: lengths enter linearly, so by least squares."""
+        lengths = ~self.equations.unknown_is_angle[stage.unknowns]
+        if lengths.any():
+            starts[:, lengths] = 0.0
+            residuals, jacobian = closing(starts)
+            starts[:, lengths] = -np.einsum("krm,km->kr", np.linalg.pinv(jacobian[:, :, lengths]), residuals)
         result = damped_newton(closing, starts, tolerance)
         self._count_effort(result.steps * (1.0 + starts.size / LARGE_BATCH))
         return result
 
-    @staticmethod
-    def _best_end(stage: Block, z: Array, ended: NewtonResult) -> Array:
-        nearest = z.copy()
-        nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.residual))]
-        return nearest
-
-    def _tolerance(self, stage: Block) -> float:
-        """What closes a block."""
-        surplus = slice_length(stage.rows) > slice_length(stage.unknowns)
-        return max(CLOSED_TOLERANCE, self.misfit if surplus else 0.0)
-
     def _closed_form(self, stage: Block, z: Array) -> list[BlockAssembly] | None:
         """The two assemblies of a block in closed form, none where it is out of reach; None where the form fails."""
-        function = None if self.counts_turns else self.functions.block_assemblies(stage)
-        if function is None:
-            return None
-        found, left, bend = function(z, self.u, self.p)
-        if is_out_of_reach(bend):
-            return []
-        # what is not a number is not below anything
-        if not (bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE):
-            return None
-        return self._sorted_assemblies(stage, z, found)
-
-    def _start_batches(self, stage: Block, closing: ResidualFunction) -> Iterator[Array]:
-        """Starts all over the circles; of a large block in batches, since any assembly will do without a sketch."""
-        starts = self._with_lengths(stage, closing, _spread_angles(slice_length(stage.unknowns)))
-        many = len(starts) if slice_length(stage.unknowns) < LARGE_BLOCK else START_BATCH
-        return (starts[first : first + many] for first in range(0, len(starts), many))
+        roots = None if self.counts_turns else closed_form_roots(self.setup, stage, z)
+        return None if roots is None else self._sorted_assemblies(stage, z, roots)
 
     def _from_converged(
-        self, stage: Block, z: Array, closing: ResidualFunction, converged: Array
+        self, stage: Block, z: Array, closing: ResidualFunction, ends: NewtonResult
     ) -> list[BlockAssembly]:
-        if self.counts_turns:
+        converged = ends.unknowns[ends.converged]
+        if self.counts_turns and len(converged):
             # angles take the turn nearest to none, wherever Newton's method wandered, if that is closed too
-            least = np.where(self.equations.unknown_is_angle[stage.unknowns], wrap_angle(converged), converged)
-            still = (
-                np.abs(closing(least)[0]).max(axis=1, initial=0.0) < CLOSED_TOLERANCE if len(converged) else converged
-            )
-            converged = np.where(still[:, None], least, converged) if len(converged) else converged
+            wrapped = np.where(self.equations.unknown_is_angle[stage.unknowns], wrap_angle(converged), converged)
+            is_closed = np.abs(closing(wrapped)[0]).max(axis=1, initial=0.0) < CLOSED_TOLERANCE
+            converged = np.where(is_closed[:, None], wrapped, converged)
             converged = converged[np.argsort(np.abs(converged).sum(axis=1), kind="stable")]
         roots: list[Array] = []
         for root in converged:
@@ -208,7 +208,7 @@ class BlockAssemblies:
         self._count_effort(STEPS_PER_ROOT * len(roots))
         return self._sorted_assemblies(stage, z, roots)
 
-    def _sorted_assemblies(self, stage: Block, z: Array, roots: list[Array]) -> list[BlockAssembly]:
+    def _sorted_assemblies(self, stage: Block, z: Array, roots: Sequence[Array]) -> list[BlockAssembly]:
         return sorted(
             (self._assembly_of(stage, z, root) for root in roots),
             key=lambda each: (
@@ -220,13 +220,13 @@ class BlockAssemblies:
         )
 
     def _assembly_of(self, stage: Block, z: Array, root: Array) -> BlockAssembly:
-        whole = z.copy()
-        whole[stage.unknowns] = root
+        unknowns = z.copy()
+        unknowns[stage.unknowns] = root
         sketched = {name: self.first_link[name] for name in self.sketched_by_level.get(stage.block_index, ())}
         pairs = {name: self.pairs[name] for name in stage.pairs}
         links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
-        w = self.functions.coordinates_ahead(stage.block_index + 1, whole, self.u, self.p)
+        w = self.functions.coordinates_ahead(stage.block_index + 1, unknowns, self.u, self.p)
         frames, own = frames_from_coordinates(w.data, self.column, links, pairs)  # floats, few of many
         gaps = [
             frames[link].to_world(self.local[link][point]) - self.sketch[name]
@@ -239,26 +239,18 @@ class BlockAssemblies:
         ]
         heights = [frames[link].to_world(at).y for link in stage.links for at in self.local[link].values()]
         return BlockAssembly(
-            whole,
+            unknowns,
             sum(float(gap.dot(gap)) for gap in gaps),
             sum(not pair.is_intended_assembly(drive) for pair, drive in drives),
             sum(heights) / len(heights) if heights else 0.0,
             sum(drive for _, drive in drives),
         )
 
-    def _coordinates(self, z: Array) -> Array:
-        return self.functions.coordinates(z, self.u, self.p)
-
-    def residual_function(self, stage: Block, z: Array, p: Array) -> ResidualFunction:
-        """A block's constraints at tries of its own unknowns, those of earlier blocks and the pairs' numbers given."""
-        return block_residual_function(self.functions, stage, z, self.u, p)
-
     def from_all_starts(self, stage: Block, z: Array) -> list[BlockAssembly]:
         """All assemblies of a block that starts about the sketch and all over the circles lead to."""
-        closing = self.residual_function(stage, z, self.p)
+        closing = block_residual_function(self.functions, stage, z, self.u, self.p)
         starts = np.concatenate([self._starts_near_sketch(stage, z)[0], _spread_angles(slice_length(stage.unknowns))])
-        ended = self._solve_from(closing, self._with_lengths(stage, closing, starts))
-        return self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
+        return self._from_converged(stage, z, closing, self._solve_from(stage, closing, starts))
 
     def _is_same(self, stage: Block, z: Array, a: Array, b: Array) -> bool:
         """Whether two roots of a block are one assembly; where turns count, they are if all that hangs on them is."""
@@ -268,13 +260,8 @@ class BlockAssemblies:
             return True
         both = np.repeat(z[None], 2, axis=0)
         both[:, stage.unknowns] = a, b
-        angles = np.array([c.kind is not MeasureKind.LENGTH for c in self.equations.coordinates])
-        return bool(
-            np.all(
-                distances(angles, *self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p))
-                < SAME_ASSEMBLY_TOLERANCE
-            )
-        )
+        w = self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p)
+        return bool(np.all(distances(~self.setup.structure.is_length, *w) < SAME_ASSEMBLY_TOLERANCE))
 
     def _starts_near_sketch(self, stage: Block, z: Array) -> tuple[Array, bool]:
         """Starts about the angles that the sketch shows, and whether it shows a large block whole.
@@ -283,29 +270,19 @@ class BlockAssemblies:
         there: its assemblies may be many, and the nearest is wanted.
         """
         unknowns = slice_length(stage.unknowns)
-        spread = _spread_angles(unknowns)
-        shown = self._sketched_angles(stage, z)
-        near = spread[: 2 * unknowns + 2].copy()
-        blur = START_ANGLE_SPREAD * near / np.pi
-        blur[: min(1, len(blur))] = 0.0
-        whole = unknowns > 2
+        sketched_angles = self._sketched_angles(stage, z)
+        starts = _spread_angles(unknowns)[: 2 * unknowns + 2]
+        blur = START_ANGLE_SPREAD * starts / np.pi
+        blur[:1] = 0.0
+        is_shown = unknowns > 2
         for index, column in enumerate(self.equations.unknowns[stage.unknowns]):
             coordinate = self.equations.coordinates[column]
             if coordinate.of_link and coordinate.part == "angle":
-                if coordinate.owner in shown:
-                    near[:, index] = shown[coordinate.owner] + blur[:, index]
+                if coordinate.owner in sketched_angles:
+                    starts[:, index] = sketched_angles[coordinate.owner] + blur[:, index]
                 else:
-                    whole = False
-        return near, whole
-
-    def _with_lengths(self, stage: Block, closing: ResidualFunction, starts: Array) -> Array:
-        """Starts whose lengths follow from their angles: lengths enter linearly, so by least squares."""
-        lengths = ~self.equations.unknown_is_angle[stage.unknowns]
-        if lengths.any():
-            starts[:, lengths] = 0.0
-            left, slope = closing(starts)
-            starts[:, lengths] = -np.einsum("krm,km->kr", np.linalg.pinv(slope[:, :, lengths]), left)
-        return starts
+                    is_shown = False
+        return starts, is_shown
 
     def _sketched_angles(self, stage: Block, z: Array) -> dict[str, float]:
         """The angle at which the sketch, and the points that are known already, show a link of the block."""
@@ -313,31 +290,18 @@ class BlockAssemblies:
         known = {name: self.first_link[name] for name in names if self.first_link[name][0] < stage.block_index}
         w = self.functions.coordinates_ahead(stage.block_index, z, self.u, self.p)
         frames, _ = frames_from_coordinates(w, self.column, {link for _, link, _ in known.values()}, {})
-        located = {name: self.sketch[name] for name in names if name in self.sketch}
-        located |= {name: frames[link].to_world(self.local[link][point]) for name, (_, link, point) in known.items()}
+        unit = self.setup.unit
+        located = {name: self.sketch[name] * unit for name in names if name in self.sketch}
+        located |= {
+            name: frames[link].to_world(self.local[link][point]) * unit for name, (_, link, point) in known.items()
+        }
         angles = {}
         for link in stage.links:
-            ends = [(self.local[link][point], located[name]) for point, name in self.points_of[link] if name in located]
-            angle = turn_between(ends) if len(ends) > 1 else None
-            if angle is not None:
-                angles[link] = angle
+            places = {point: located[name] for point, name in self.points_of[link] if name in located}
+            fitted = fitted_frame(self.setup.shapes[link], places)
+            if fitted is not None:
+                angles[link] = float(fitted.angle)
         return angles
-
-
-def block_residual_function(
-    functions: EquationFunctions, stage: Block, z: Array, u: Array, p: Array
-) -> ResidualFunction:
-    """A block's constraints at tries of its own unknowns, those of earlier blocks and all numbers given."""
-    function = functions.block_call(stage)
-
-    def closing(tried: Array) -> tuple[Array, Array]:
-        count = len(tried)
-        whole = np.repeat(z[None], count, axis=0)
-        whole[:, stage.unknowns] = tried
-        left, slopes = function.evaluate_batch(count, whole, u, p) if count > 1 else function(whole[0], u, p)
-        return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
-
-    return closing
 
 
 def _spread_angles(unknowns: int) -> Array:
@@ -349,6 +313,6 @@ def _spread_angles(unknowns: int) -> Array:
     for _ in range(40):
         root = (1.0 + root) ** (1.0 / (unknowns + 1))
     steps = (1.0 / root) ** np.arange(1, unknowns + 1)
-    many = min(6 * unknowns**2, MAX_STARTS) or 1
-    spread = np.arange(many)[:, None] * steps % 1.0
+    count = min(6 * unknowns**2, MAX_STARTS) or 1
+    spread = np.arange(count)[:, None] * steps % 1.0
     return 2.0 * np.pi * np.where(spread > 0.5, spread - 1.0, spread)

@@ -1,24 +1,17 @@
-"""The assembly nearest to the sketch, found block after block, and how far from the sketch it lies."""
+"""The assembly nearest to the sketch, found block after block."""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
 from itertools import count
-from math import hypot, pi, remainder, tau
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
-from planar.foundation.geometry import GROUND
-from planar.foundation.units import parse_unit
-from planar.model.link_shapes import fitted_frame
-from planar.model.mechanism import named_points, sketched_places
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
-from planar.solving.prepared_mechanism import PreparedMechanism
 
 EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
@@ -29,10 +22,6 @@ MAX_BEST_FIRST_EFFORT = 3000.0
 the search looks for a nearer assembly; beyond it takes the best partial one to an end."""
 MAX_REPEATED_EFFORT = 1.2 * MAX_BEST_FIRST_EFFORT
 """The same effort at which the search stops without an assembly: combinations of earlier blocks grow exponentially."""
-FAR_FROM_SKETCH = 0.1
-"""The part of the mechanism's size by which a point may be off its sketch without a remark."""
-TURNED_FROM_SKETCH = pi / 4
-"""The angle (rad) by which a link may be turned against its sketched points without a remark."""
 
 
 class Assembly(NamedTuple):
@@ -74,8 +63,8 @@ class _BlockSearch:
         if self._is_dead_end(z, stage.unknowns.start):
             return []
         is_farthest = self.last_failure is None or stage.block_index > self.last_failure.stage.block_index
-        found, nearest = self.candidates.near_sketch(stage, z, needs_nearest=is_farthest)
-        if not found:
+        assemblies, nearest = self.candidates.near_sketch(stage, z, needs_nearest=is_farthest)
+        if not assemblies:
             if is_farthest:
                 self.last_failure = AssemblySearchFailure(stage, nearest)
             self._dependencies = self._dependencies or [
@@ -83,12 +72,14 @@ class _BlockSearch:
             ]
             self._dead_ends.setdefault(stage.block_index, set()).add(z[self._dependencies[stage.block_index]].tobytes())
             self.is_hopeless = not self._dependencies[stage.block_index]
-        return found
+        return assemblies
 
     def _is_dead_end(self, z: Array, known: int) -> bool:
         columns = self._dependencies or []
-        ends = self._dead_ends.items()
-        return any(columns[level][-1] < known and z[columns[level]].tobytes() in places for level, places in ends)
+        return any(
+            columns[level][-1] < known and z[columns[level]].tobytes() in places
+            for level, places in self._dead_ends.items()
+        )
 
 
 class _Node(NamedTuple):
@@ -103,9 +94,9 @@ class _Node(NamedTuple):
     "blocks in which another choice lies as near to the sketch"
 
 
-def _failure_beyond(node: _Node, stages: Sequence[Block]) -> AssemblySearchFailure:
-    """What to say of a search that stopped before any block failed."""
-    return AssemblySearchFailure(stages[len(node.ranks)], node.z)
+def _deepest_index(heap: Sequence[_Node]) -> int:
+    """The partial assembly of most blocks, of several the best."""
+    return min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4]))
 
 
 def find_nearest_assembly(
@@ -120,85 +111,46 @@ def find_nearest_assembly(
     stages = candidates.equations.blocks
     number, groups = count(), _BlockSearch(candidates)
     heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
-    chosen: _Node | None = None
-    taken: _Node | None = None
-    tied = 0
+    nearest: list[_Node] = []  # whole assemblies, of equal cost
+    regular: _Node | None = None
     while heap:
         is_best_first = candidates.repeated_effort < MAX_BEST_FIRST_EFFORT
-        if candidates.repeated_effort >= MAX_REPEATED_EFFORT or (chosen is not None and not is_best_first):
+        if candidates.repeated_effort >= MAX_REPEATED_EFFORT or (nearest and not is_best_first):
             break
-        if is_best_first:
-            node = heapq.heappop(heap)
-        else:
-            node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
-        if chosen is not None and node.cost > chosen.cost:
-            return Assembly((taken or chosen).z, (taken or chosen).ties if tied else ())
+        node = heapq.heappop(heap) if is_best_first else heap.pop(_deepest_index(heap))
+        if nearest and node.cost > nearest[0].cost:
+            heap.clear()
+            break
         if len(node.ranks) == len(stages):
-            tied += chosen is not None
-            chosen = chosen or node
-            if taken is None and (is_regular is None or is_regular(node.z)):
-                taken = node
-            if tied and (taken is not None or tied > MAX_TIED):
-                return Assembly((taken or chosen).z, (taken or chosen).ties)
+            nearest.append(node)
+            if regular is None and (is_regular is None or is_regular(node.z)):
+                regular = node
+            if len(nearest) > 1 and (regular is not None or len(nearest) > MAX_TIED + 1):
+                heap.clear()
             continue
-        found = groups.find_assemblies(stages[len(node.ranks)], node.z)
+        assemblies = groups.find_assemblies(stages[len(node.ranks)], node.z)
         if groups.is_hopeless:
             break
-        for rank, each in enumerate(found):
-            alike = sum(abs(other.distance - each.distance) <= EQUAL_DISTANCE_TOLERANCE for other in found) > 1
+        for rank, part in enumerate(assemblies):
+            alike = sum(abs(other.distance - part.distance) <= EQUAL_DISTANCE_TOLERANCE for other in assemblies) > 1
             heapq.heappush(
                 heap,
                 _Node(
-                    round((node.cost + each.distance) / EQUAL_DISTANCE_TOLERANCE) * EQUAL_DISTANCE_TOLERANCE,
-                    node.slides_behind + each.slides_behind,
+                    round((node.cost + part.distance) / EQUAL_DISTANCE_TOLERANCE) * EQUAL_DISTANCE_TOLERANCE,
+                    node.slides_behind + part.slides_behind,
                     (*node.ranks, rank),
                     next(number),
-                    each.z,
+                    part.z,
                     (*node.ties, len(node.ranks)) if alike else node.ties,
                 ),
             )
-    if chosen is None and not groups.is_hopeless:  # cut off: what is whole already will do
-        chosen = min((node for node in heap if len(node.ranks) == len(stages)), default=None)
-    if chosen is None:
-        failure = groups.last_failure or _failure_beyond(max(heap, key=lambda node: len(node.ranks)), stages)
-        is_cut_off = bool(heap) and not groups.is_hopeless
-        return failure._replace(effort=candidates.effort, is_cut_off=is_cut_off)
-    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), bool(heap))
-
-
-def sketch_distance_remarks(setup: PreparedMechanism, z: Array) -> tuple[str, ...]:
-    """A sentence on an assembly that lies far from the sketch: the farthest point, and the link that is turned most."""
-    mechanism, places = setup.mechanism, sketched_places(setup.mechanism)
-    w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p) * setup.scale
-    frames, _ = frames_from_coordinates(w, setup.column, [*places], {})
-    frames[mechanism.frame] = GROUND
-    distances = {
-        (link, point): hypot(*(frames[link].to_world(setup.shapes[link].position(point)) - place))
-        for link, points in places.items()
-        for point, place in points.items()
-    }
-    turns = {
-        link: remainder(float(frames[link].angle) - sketched.angle, tau)
-        for link, points in places.items()
-        if link != mechanism.frame and (sketched := fitted_frame(setup.shapes[link], points)) is not None
-    }
-    clauses = []
-    farthest = max(distances, key=lambda member: distances[member])
-    if distances[farthest] > FAR_FROM_SKETCH * _diagonal(setup, w):
-        name = next(point.name for point in named_points(mechanism) if farthest in point.members)
-        distance = parse_unit(mechanism.units.length).from_si(float(distances[farthest]))
-        clauses.append(f"{name} is {distance:.4g} {mechanism.units.length} from where it is sketched")
-    link = max(turns, key=lambda name: abs(turns[name]), default="")
-    if link and abs(turns[link]) > TURNED_FROM_SKETCH:
-        clauses.append(f"link {link!r} is turned by {turns[link] * 180 / pi:.4g} deg against its sketched points")
-    if not clauses:
-        return ()
-    return (f"at the file's inputs {' and '.join(clauses)}, far from the sketch; check lengths, angles and sketch",)
-
-
-def _diagonal(setup: PreparedMechanism, w: Array) -> float:
-    """The diagonal (m) of the box round all points of links."""
-    frames, _ = frames_from_coordinates(w, setup.column, [*setup.shapes], {})
-    points = [frames[link].to_world(point) for link, shape in setup.shapes.items() for point in shape.points.values()]
-    x, y = [float(point.x) for point in points], [float(point.y) for point in points]
-    return hypot(max(x) - min(x), max(y) - min(y))
+    if not groups.is_hopeless and not nearest:  # cut off: what is whole already will do
+        nearest = sorted(node for node in heap if len(node.ranks) == len(stages))[:1]
+    if nearest:
+        chosen = regular or nearest[0]
+        return Assembly(chosen.z, chosen.ties if len(nearest) > 1 else (), bool(heap))
+    failure = groups.last_failure
+    if failure is None:  # cut off before any block failed
+        farthest = max(heap, key=lambda node: len(node.ranks))
+        failure = AssemblySearchFailure(stages[len(farthest.ranks)], farthest.z)
+    return failure._replace(effort=candidates.effort, is_cut_off=bool(heap) and not groups.is_hopeless)

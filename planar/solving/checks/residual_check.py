@@ -6,20 +6,14 @@ second part, since the residual of a flipped linkage is zero too, is `branch_che
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from copy import copy
-from functools import cached_property
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from planar.equations.constraint_check import ORDERS, ConstraintCheck, constraint_check
-from planar.equations.mechanism_numbers import pair_numbers_from
-from planar.equations.residuals import Frames, PairValues
+from planar.equations.constraint_check import constraint_check
 from planar.foundation.arrays import Array
-from planar.foundation.jets import Jet, Scalar, value_and_rates
-from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind, Pair
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair
 
 CONTACT_TOLERANCE = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
@@ -42,124 +36,64 @@ def residual_tolerance(link_count: int | Array, reach: float | Array) -> Array:
     return 16.0 * EPS * (4 + link_count) * np.maximum(1.0, reach)
 
 
-class ResidualCheck:
-    """The constraints of one mechanism (SI, lengths judged in units of its size)."""
+def stack_motion(w: Sequence[Array], u: Sequence[Array]) -> Array:
+    """Positions of one motion, and their rates as far as they are needed, as `ResidualCheck` takes them.
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        shapes: Mapping[str, LinkShape],
-        unit: float,
-        named: Mapping[str, Pair] | None = None,
-    ):
-        self.mechanism, self.unit = mechanism, unit
-        self.relative_motions = relative_motions(mechanism) if named is None else named
-        self.numbers = {
-            pair.name: pair.measure([shapes[link] for link in pair.bodies])
-            for pair in (*mechanism.pairs, *(self.relative_motions[given.pair] for given in mechanism.inputs))
-        }
+    `w` and `u` have the value, the first and the second rate of all coordinates (samples, coordinates) and of all
+    inputs (samples, inputs); returns (orders, coordinates and inputs, samples).
+    """
+    return np.array([np.hstack([rates, of_inputs]).T for rates, of_inputs in zip(w, u, strict=True)])
+
+
+class ResidualCheck:
+    """The constraints of all mechanisms of one structure, lengths in units of a mechanism's size.
+
+    The numbers p of pairs are (numbers,), or (numbers, samples) where samples are of different designs.
+    """
+
+    def __init__(self, mechanism: Mechanism, column: Mapping[tuple[str, str], int], open_rows: Collection[int] = ()):
+        """`column` is the place of each coordinate; `open_rows` may stay open by a misfit, with which they are judged,
+        see `PreparedMechanism.residuals`."""
         self.row_pairs = [pair.name for pair in mechanism.pairs for _ in pair.residual_kinds]
         self.row_pairs += [given.pair for given in mechanism.inputs]
         """The pair of every constraint, the inputs' last."""
-        reach = max(
-            (abs(value) for pair in mechanism.pairs for value in _lengths(pair, self.numbers[pair.name])), default=0.0
-        )
-        self.tolerance = float(residual_tolerance(len(mechanism.links), reach / unit))
-        self.open_rows: frozenset[int] = frozenset()
-        "rows of pairs that may stay open by a misfit: they are judged with it, see `PreparedMechanism.residuals`"
+        self._open_rows = list(open_rows)
+        self._has_contacts = any(type(pair).contact_gap is not Pair.contact_gap for pair in mechanism.pairs)
+        self._check = constraint_check(mechanism, len(column))
 
-    def with_inputs_of(self, mechanism: Mechanism) -> ResidualCheck:
-        """The same for a mechanism that differs from this one in its inputs' numbers alone."""
-        there = copy(self)
-        there.mechanism = mechanism
-        return there
-
-    def of_designs(self, p: Array) -> ResidualCheck:
-        """The same of designs, each with its own p (numbers, designs), whose frames are in lengths of the size."""
-        there = copy(self)
-        there.unit, there.p = 1.0, p
-        return there
-
-    @cached_property
-    def p(self) -> Array:
-        """The numbers of all pairs, lengths in sizes."""
-        return pair_numbers_from(self.mechanism, self.numbers, self.unit)
-
-    @cached_property
-    def _check(self) -> ConstraintCheck:
-        own_count = sum(len(pair.coordinate_kinds) for pair in self.mechanism.pairs)
-        moving_count = sum(link.name != self.mechanism.frame for link in self.mechanism.links)
-        return constraint_check(self.mechanism, 3 * moving_count + own_count)
-
-    def _motion(self, frames: Frames, own: PairValues, inputs: Sequence[Scalar] | Array, orders: int) -> Array:
-        """Links, pairs and inputs, values and rates up to `orders` (orders, entries, samples), lengths in sizes."""
-        values: list[tuple[Scalar, float]] = []
-        for link in self.mechanism.links:
-            if link.name != self.mechanism.frame:
-                frame = frames[link.name]
-                values += [(frame.x, self.unit), (frame.y, self.unit), (frame.angle, 1.0)]
-        for pair in self.mechanism.pairs:
-            kinds = (kind for _, kind in pair.coordinate_kinds)
-            values += [(value, self._unit_of(kind)) for value, kind in zip(own.get(pair.name, ()), kinds, strict=True)]
-        kinds = (self.relative_motions[given.pair].input_kind for given in self.mechanism.inputs)
-        values += [(value, self._unit_of(kind)) for value, kind in zip(inputs, kinds, strict=True)]
-        rates = [(value_and_rates(value)[:orders], unit) for value, unit in values]
-        count = max((np.size(part) for parts, _ in rates for part in parts), default=1)
-        motion: Array = np.zeros((orders, len(values), count))
-        for entry, (parts, unit) in enumerate(rates):
-            for order, part in enumerate(parts):
-                motion[order, entry] = part
-            motion[:, entry] /= unit
-        return motion
-
-    def residuals(self, frames: Frames, own: PairValues, u: Sequence[Scalar] | Array | None = None) -> Array:
+    def residuals(self, motion: Array, p: Array) -> Array:
         """How far every constraint is open (constraints, samples): lengths of the size, or rad; see `row_pairs`.
 
-        Frames of floats or arrays (samples,), whose cos and sin are made afresh from their angles. `u` (inputs, ...)
-        are the positions of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
+        cos and sin of links are computed from their angles. What is not a number counts as infinitely open.
         """
-        motion = self._motion(frames, own, [given.position for given in self.mechanism.inputs] if u is None else u, 1)
         with np.errstate(all="ignore"):  # of what is not finite
-            gaps = self._check.residuals(self._check.evaluate(motion, self.p), motion)
-        gaps[list(self.open_rows)] *= 0.0
+            gaps = self._check.residuals(self._check.evaluate(motion[:1], p), motion)
+        gaps[self._open_rows] *= 0.0
         return np.nan_to_num(gaps, nan=np.inf, posinf=np.inf)
 
-    def find_open_contact(self, frames: Frames, own: PairValues) -> tuple[str, float] | None:
-        """The first contact that guides have to keep closed and do not: its pair and the gap (m).
+    def find_open_contact(self, motion: Array, p: Array) -> tuple[str, float] | None:
+        """The first contact that guides have to keep closed and do not: its pair and the gap (sizes).
 
         No gap but a rate of it: the contact is closed in passing only.
         """
-        if all(type(pair).contact_gap is Pair.contact_gap for pair in self.mechanism.pairs):
+        if not self._has_contacts:
             return None
-        motion = self._motion(frames, own, [given.position for given in self.mechanism.inputs], ORDERS)
         with np.errstate(all="ignore"):  # of what is not finite
-            evaluated = self._check.evaluate(motion, self.p)
+            evaluated = self._check.evaluate(motion, p)
             scales = self._check.contact_scales(evaluated, motion)
             for name, gap in evaluated.gaps:
                 if np.nanmax(np.abs(gap) / scales, initial=0.0) > CONTACT_TOLERANCE:
-                    return name, float(np.max(np.abs(gap[0]))) * self.unit
+                    return name, float(np.max(np.abs(gap[0])))
         return None
 
-    def rate_residuals(
-        self, frames: Frames, own: PairValues, inputs: Sequence[Jet] | None = None
-    ) -> list[tuple[Array, str]]:
-        """How far velocities, then accelerations, break the worst constraint, as a part of its own terms; its pair.
-
-        Of jets of arrays, an array. `inputs` are the inputs with their rates, else the mechanism's own.
-        """
-        u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
+    def rate_residuals(self, motion: Array, p: Array) -> list[tuple[Array, str]]:
+        """How far velocities, then accelerations, break the worst constraint (samples,), as a part of its own terms;
+        its pair."""
         worst_rates: list[tuple[Array, str]] = []
         with np.errstate(all="ignore"):  # of what is not finite
-            for errors in self._check.rate_errors(self._check.evaluate(self._motion(frames, own, u, ORDERS), self.p)):
-                errors[list(self.open_rows)] *= 0.0
+            for errors in self._check.rate_errors(self._check.evaluate(motion, p)):
+                errors[self._open_rows] *= 0.0
                 gaps = np.nan_to_num(errors, nan=np.inf)
                 worst = int(np.argmax(gaps.max(axis=1, initial=0.0))) if len(gaps) else -1
                 worst_rates.append((gaps.max(axis=0, initial=0.0), self.row_pairs[worst] if worst >= 0 else ""))
         return worst_rates
-
-    def _unit_of(self, kind: MeasureKind) -> float:
-        return self.unit if kind is MeasureKind.LENGTH else 1.0
-
-
-def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:
-    return [value for value, kind in zip(numbers, pair.number_kinds, strict=True) if kind is MeasureKind.LENGTH]

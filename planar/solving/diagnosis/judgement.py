@@ -1,12 +1,23 @@
-"""Whether anything can move from an assembled position: the judgement that every command asks for."""
+"""Whether anything can move from an assembled position, and whether the inputs determine the motion there."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.solving.diagnosis import refusals
 from planar.solving.diagnosis.redundancy import can_move_alone, count_motions
 from planar.solving.prepared_mechanism import PreparedMechanism
+from planar.solving.rates.regularity import (
+    freedom_by_rank,
+    input_rates_agree,
+    is_always_singular,
+    links_free_at_rest,
+)
 
 
 def judge_motion(setup: PreparedMechanism, z: Array, pair: str | None = None) -> NoAnswer | None:
@@ -30,3 +41,33 @@ def judge_motion(setup: PreparedMechanism, z: Array, pair: str | None = None) ->
         if not any(can_move_alone(setup, w, name) for name in running):
             return refusals.surplus_inputs(setup, mobility)
     return None
+
+
+def judge_velocity(setup: PreparedMechanism, z: Array) -> tuple[int, Callable[[], NoAnswer] | None]:
+    """The mobility at a position, and what computes the refusal where the inputs do not determine the velocity there or
+    contradict one another; None where they do determine it.
+
+    With one freedom more than inputs it is so to first order: the next orders tell whether it is in truth.
+    """
+    s, rest = setup.inputs, np.zeros_like(z)
+    # the unknowns rest while the inputs move
+    y, y1, y2 = (np.concatenate(parts) for parts in ((z, s.u), (rest, s.u1), (rest, s.u2)))
+    motion = setup.functions.kinematics(y, y1, y2, s.p)
+    mobility, weak = freedom_by_rank(setup, motion)
+    if not weak:
+        if mobility < s.u.size and not input_rates_agree(setup, motion):
+            return mobility, partial(refusals.disagreeing_inputs, setup, mobility, "velocities")
+        return mobility, None
+
+    def refuse() -> NoAnswer:
+        links = links_free_at_rest(setup, motion.jacobian)
+        links = links or list(dict.fromkeys(link for block in weak for link in block.links))
+        if mobility <= s.u.size:
+            return refusals.dead_point(setup, links)
+        count = count_motions(setup, motion.w)
+        always = any(is_always_singular(setup, block, z) for block in weak) if count is None else count > s.u.size
+        if always:
+            return refusals.always_free(setup, links, motion.w)
+        return refusals.change_point(setup, links, mobility, z)
+
+    return mobility, refuse

@@ -38,27 +38,18 @@ def smallest_dependent_sets(
     rows_of: dict[str, list[int]] = {}
     for row, owner in enumerate(owners):
         rows_of.setdefault(owner, []).append(row)
-    found: dict[frozenset[str], None] = {}
+    sets: dict[tuple[str, ...], None] = {}
     for owner, rows in rows_of.items():
         span = left_null
         if np.linalg.norm(span[rows]) < ZERO_COMPONENT:
             continue
         for other in order(owner):
-            without = span @ _null_combinations(span[rows_of.get(other, [])])
+            # the columns are orthonormal, so sizes mean something
+            without = span @ null_space(span[rows_of.get(other, [])], ZERO_COMPONENT, unit=1.0)
             if without.size and np.linalg.norm(without[rows]) > ZERO_COMPONENT:
                 span = without
-        held = frozenset(name for name, each in rows_of.items() if np.linalg.norm(span[each]) > ZERO_COMPONENT)
-        found[held] = None
-    sets = [tuple(name for name in rows_of if name in held) for held in found]
+        sets[tuple(name for name, each in rows_of.items() if np.linalg.norm(span[each]) > ZERO_COMPONENT)] = None
     return tuple(sorted(sets, key=len))
-
-
-def _null_combinations(rows: Array) -> Array:
-    """Combinations of columns that vanish in these rows; the columns are orthonormal, so sizes mean something."""
-    if not rows.size:
-        return np.eye(rows.shape[1])
-    _, values, vectors = np.linalg.svd(rows)
-    return vectors[int(np.sum(values > ZERO_COMPONENT)) :].T
 
 
 def find_jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> tuple[list[str], list[str]] | None:
@@ -68,17 +59,17 @@ def find_jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> tupl
     every input moves.
     """
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    places = _closed_positions(setup, w) if names else ()
-    if not places:
-        return None
     constraints = FullConstraints(setup)
+    positions = _closed_positions(constraints, w) if names else ()
+    if not positions:
+        return None
     moves = np.zeros(len(names))
-    for place in places:
-        free = null_space(constraints.jacobian(place))
-        rates = np.abs(constraints.relative_jacobian(names, place) @ free)
+    for position in positions:
+        free = constraints.free_motions(position)
+        rates = np.abs(constraints.relative_jacobian(names, position) @ free)
         moves = np.maximum(moves, rates.max(axis=1, initial=0.0))
-    fast = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * ZERO_COMPONENT]
-    if not fast or not free.size:
+    jammed = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * ZERO_COMPONENT]
+    if not jammed or not free.size:
         return None
     share = np.abs(free).max(axis=1)
     links = dict.fromkeys(
@@ -86,7 +77,7 @@ def find_jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> tupl
         for coordinate, part in zip(constraints.coordinates, share, strict=True)
         if coordinate.of_link and part > 1e-4
     )
-    return fast, list(links)
+    return jammed, list(links)
 
 
 def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
@@ -109,7 +100,7 @@ def releasing_parts(setup: PreparedMechanism, w: Array) -> tuple[str | None, tup
         """How many freedoms these pairs leave; 0 where some input cannot move."""
         constraints = FullConstraints(setup, pairs)
         owners = {pair.name for pair in pairs} | {link.name for link in mechanism.links if link.name != removed}
-        columns = [each.owner in owners for each in constraints.coordinates]
+        columns = [coordinate.owner in owners for coordinate in constraints.coordinates]
         free = null_space(constraints.jacobian(w)[:, columns])
         rates = np.abs(input_rows[:, columns] @ free).max(axis=1, initial=0.0)
         return free.shape[1] if np.all(rates > 100.0 * ZERO_COMPONENT) else 0
@@ -119,12 +110,14 @@ def releasing_parts(setup: PreparedMechanism, w: Array) -> tuple[str | None, tup
     entries = [group for group in pair_entries(mechanism) if len(group) == 1 and group[0].name not in names]
     for kind in (choices, [(None, [pair for pair in mechanism.pairs if pair not in group]) for group in entries]):
         counted = [(freedoms(pairs, link), link, pairs) for link, pairs in kind[:MAX_REMOVALS]]
-        released = [each for each in counted if each[0]]
+        released = [choice for choice in counted if choice[0]]
         if released:
-            _, link, pairs = min(released, key=lambda each: each[0])
-            kept = {pair.name for pair in pairs}
-            gone = [pair for pair in mechanism.pairs if (link in pair.bodies if link else pair.name not in kept)]
-            return link, tuple(dict.fromkeys(pair.entry_name() for pair in gone))
+            _, link, pairs = min(released, key=lambda choice: choice[0])
+            remaining = {pair.name for pair in pairs}
+            removed = [
+                pair for pair in mechanism.pairs if (link in pair.bodies if link else pair.name not in remaining)
+            ]
+            return link, tuple(dict.fromkeys(pair.entry_name() for pair in removed))
     return None, ()
 
 
@@ -139,37 +132,36 @@ def _pairs_without(mechanism: Mechanism, link: str) -> list[Pair]:
 
 def can_move_alone(setup: PreparedMechanism, w: Array, pair: str) -> bool:
     """Whether the input at a pair can move from a position w, to first order, while the other inputs stand still."""
-    constraints = FullConstraints(setup)
     others = tuple(given.pair for given in setup.mechanism.inputs if given.pair != pair)
-    return null_space(np.vstack([constraints.jacobian(w), constraints.relative_jacobian(others, w)])).size > 0
+    return FullConstraints(setup).free_motions(w, others).size > 0
 
 
 def is_rigid(setup: PreparedMechanism, w: Array) -> bool:
     """Whether the pairs, inputs left aside, allow no motion from a position w even to first order."""
-    return not null_space(FullConstraints(setup).jacobian(w)).size
+    return not FullConstraints(setup).free_motions(w).size
 
 
 def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], ...]:
     """The smallest sets of inputs that move one another, or cannot move; none where the mechanism cannot be joined."""
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    places = _closed_positions(setup)
-    if not places:
+    constraints = FullConstraints(setup)
+    positions = _closed_positions(constraints)
+    if not positions:
         return ()
-    w, constraints = places[-1], FullConstraints(setup)
-    rates = constraints.relative_jacobian(names, w) @ null_space(constraints.jacobian(w))
+    w = positions[-1]
+    rates = constraints.relative_jacobian(names, w) @ constraints.free_motions(w)
     together = null_space(rates.T) if rates.size else np.eye(len(names))
     return smallest_dependent_sets(together, names, lambda name: [other for other in names if other != name])
 
 
-def _closed_positions(setup: PreparedMechanism, w: Array | None = None) -> tuple[Array, ...]:
+def _closed_positions(constraints: FullConstraints, w: Array | None = None) -> tuple[Array, ...]:
     """A closed position (w, or one with the inputs where they are if possible) and a generic one beside it; empty if
     there is none."""
-    if len(setup.equations.coordinates) > MAX_COORDINATES:
+    if len(constraints.coordinates) > MAX_COORDINATES:
         return ()
-    constraints = FullConstraints(setup)
     w = find_closed_position(constraints) if w is None else w
     if w is None:
         return ()
-    free = null_space(constraints.jacobian(w))
+    free = constraints.free_motions(w)
     beside = constraints.correct(w + random_step(free, np.random.default_rng(0), PROBE_DISTANCE)) if free.size else None
     return (w,) if beside is None else (w, beside)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.errors import join_names as several
+from planar.foundation.lazy_module import LazyModule
 from planar.foundation.time_limit import time_is_over
 from planar.model.mechanism import unjoined_points
 from planar.model.pairs import MeasureKind, joining_entry_text
@@ -22,10 +24,15 @@ from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-MAX_BRANCHES_TOLD = 4
-"""Ways that are told one by one."""
+if TYPE_CHECKING:
+    from planar.solving.diagnosis import redundancy
+else:  # what finds causes is loaded only when something is refused
+    redundancy = LazyModule("planar.solving.diagnosis.redundancy")
+
+MAX_BRANCHES_LISTED = 4
+"""Branches that are listed one by one."""
 DISTINCT_RATE = 1e-3
-"""Rates of an angle on two ways that tell them apart."""
+"""Rates of an angle on two branches that tell them apart."""
 
 
 def free_links(setup: PreparedMechanism) -> NoAnswer:
@@ -94,8 +101,8 @@ def _missing_pairs(setup: PreparedMechanism, links: Sequence[str]) -> str:
     mechanism, loose = setup.mechanism, set(links)
     shared = {point: carriers for point, carriers in unjoined_points(mechanism).items() if loose & set(carriers)}
     if shared:
-        told = [f"{_links(carriers)} at {point!r}" for point, carriers in shared.items()]
-        return f"no pair joins {several(told, 3)}: add {several(map(joining_entry_text, shared), 3)} to the pairs"
+        places = [f"{_links(carriers)} at {point!r}" for point, carriers in shared.items()]
+        return f"no pair joins {several(places, 3)}: add {several(map(joining_entry_text, shared), 3)} to the pairs"
     moving = [link.name for link in mechanism.links if link.name != mechanism.frame]
     joints = {link: [pair.entry_name() for pair in mechanism.pairs if link in pair.links] for link in moving}
     hanging = [f"link {link!r} hangs at {names[0]!r} alone" for link, names in joints.items() if len(names) == 1]
@@ -114,34 +121,25 @@ def always_free(setup: PreparedMechanism, links: Sequence[str], w: Array | None 
         return jam
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"with {count_phrase(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some "
-        "of the links "
-        f"hold each other more than once; give an input at {_offered_pairs(setup, links, 6)}",
+        f"with {count_phrase(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the "
+        f"links hold each other more than once; give an input at {_offered_pairs(setup, links, 6)}",
         **_all_links(links),
     )
 
 
 def jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free; w as for `always_free`."""
-    from planar.solving.diagnosis.redundancy import find_jammed_inputs
-
-    found = find_jammed_inputs(setup, w)
-    if found is None:
+    jam = redundancy.find_jammed_inputs(setup, w)
+    if jam is None:
         return None
-    names, links = found
-    one = len(names) == 1
+    names, links = jam
+    held = list(dict.fromkeys(link for name in names for link in setup.relative_motions[name].links))
     return NoAnswer(
         Outcome.INPUT_JAMMED,
-        f"{_inputs_at(names)} cannot move: the pairs hold {_links(_links_at(setup, names))} fast, while "
-        f"{_links(links)} "
+        f"{_inputs_at(names)} cannot move: the pairs hold {_links(held)} fast, while {_links(links)} "
         f"{'is' if len(links) == 1 else 'are'} free; drive {_offered_pairs(setup, links, 4)} instead"
-        f"{'' if one else ', with one input for each way'}",
+        f"{'' if len(names) == 1 else ', with one input for each way'}",
     )
-
-
-def _links_at(setup: PreparedMechanism, names: Sequence[str]) -> list[str]:
-    """The links at these pairs."""
-    return list(dict.fromkeys(link for name in names for link in setup.relative_motions[name].links))
 
 
 def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
@@ -160,10 +158,8 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
 
 def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     """What to remove from a structure: its inputs, or what lets it move."""
-    from planar.solving.diagnosis.redundancy import releasing_parts
-
     mechanism = setup.mechanism
-    link, pairs = releasing_parts(setup, w)
+    link, pairs = redundancy.releasing_parts(setup, w)
     removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
     if link is not None:
         removal = f"link {link!r} with its {removal}"
@@ -191,9 +187,9 @@ def change_point(setup: PreparedMechanism, links: Sequence[str], mobility: int, 
     """A position from which the mechanism may go on in several ways, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
-        f"{setup.describe_position()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move "
-        "in more than one way "
-        f"from here; move the input, or give a further input{_branch_choices(setup, z)}",
+        f"{setup.describe_position()} the mechanism has {count_phrase(mobility, 'freedom')} for "
+        f"{count_phrase(len(setup.mechanism.inputs), 'input')}: {_links(links)} may move in more than one way from "
+        f"here; move the input, or give a further input{_branch_choices(setup, z)}",
         **_all_links(links),
     )
 
@@ -205,24 +201,24 @@ def _branch_choices(setup: PreparedMechanism, z: Array) -> str:
     from planar.solving.continuation.bifurcation import bifurcation_at_start
     from planar.solving.continuation.solution_curve import SolutionCurve
 
-    found = bifurcation_at_start(SolutionCurve(setup, setup.inputs.u, np.ones(1)), np.append(z, 0.0))
-    if found is None or len(found.branches) < 2:
+    curve = SolutionCurve(setup, setup.inputs.u, np.ones(1))
+    bifurcation = bifurcation_at_start(curve, np.append(z, 0.0))
+    if bifurcation is None or len(bifurcation.branches) < 2:
         return ""
     columns = list(setup.equations.unknowns)
     (slides,) = setup.structure.input_slides
-    rates = np.array([way.tangent[:-1] / way.input_rate for way in found.branches]) * setup.scale[columns]
-    rates /= setup.unit if slides else 1.0
-    angles = [setup.equations.coordinates[column].kind is not MeasureKind.LENGTH for column in columns]
-    apart = np.ptp(rates, axis=0)
-    most = int(np.argmax(np.where(angles, apart, 0.0) if np.any(apart[angles] > DISTINCT_RATE) else apart))
-    what = setup.equations.coordinates[columns[most]].owner
-    moved = [f"{k} moves {what!r} by {_rounded(rate)}" for k, rate in enumerate(rates[:MAX_BRANCHES_TOLD, most], 1)]
-    each = f"{'rad' if angles[most] else 'm'} for each {'m' if slides else 'rad'} of the input"
-    return f"; a cycle goes on by the way whose number `branches` (--branch) has: {', '.join(moved)} {each}"
-
-
-def _rounded(rate: float) -> str:
-    return f"{round(rate, 6) + 0.0:.4g}"
+    branch_rates = [branch.tangent[:-1] / branch.input_rate for branch in bifurcation.branches]
+    rates = np.array(branch_rates) * setup.scale[columns] / setup.input_scale
+    angles = ~setup.structure.is_length[columns]
+    spread = np.ptp(rates, axis=0)
+    index = int(np.argmax(np.where(angles, spread, 0.0) if np.any(spread[angles] > DISTINCT_RATE) else spread))
+    owner = setup.equations.coordinates[columns[index]].owner
+    moves = [
+        f"{number} moves {owner!r} by {round(rate, 6) + 0.0:.4g}"
+        for number, rate in enumerate(rates[:MAX_BRANCHES_LISTED, index], 1)
+    ]
+    unit = f"{'rad' if angles[index] else 'm'} for each {'m' if slides else 'rad'} of the input"
+    return f"; a cycle goes on by the way whose number `branches` (--branch) has: {', '.join(moves)} {unit}"
 
 
 def dead_point(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
@@ -237,43 +233,41 @@ def dead_point(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
 
 def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, ending: TrackingEnd) -> NoAnswer:
     """Where a motion of the inputs ends: a dead point, the infinite, or branches that cannot be told apart."""
-    drive = _offered_pairs(setup, links, 4)
+    drive, outcome = _offered_pairs(setup, links, 4), Outcome.BRANCH_LOST
     if ending is TrackingEnd.DEAD_POINT:
-        return NoAnswer(
-            Outcome.DEAD_POINT,
+        outcome = Outcome.DEAD_POINT
+        sentence = (
             f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
-            f"stay short of it, go through the whole circuit, or drive {drive}",
+            f"stay short of it, go through the whole circuit, or drive {drive}"
         )
-    if ending is TrackingEnd.ENDLESS:
-        return NoAnswer(
-            Outcome.BRANCH_LOST,
+    elif ending is TrackingEnd.ENDLESS:
+        sentence = (
             f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
-            f"where lines become parallel; stop short of it, or drive {drive}",
+            f"where lines become parallel; stop short of it, or drive {drive}"
         )
-    if ending is TrackingEnd.OUT_OF_RANGE:
-        return NoAnswer(
-            Outcome.BRANCH_LOST,
+    elif ending is TrackingEnd.OUT_OF_RANGE:
+        sentence = (
             f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
             f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
-            "file",
+            "file"
         )
-    if ending is TrackingEnd.INTERRUPTED:
-        return NoAnswer(
-            Outcome.INTERRUPTED,
-            f"this assembly was followed as far as {where}, when {time_is_over()}; go on from there, or give more time",
+    elif ending is TrackingEnd.INTERRUPTED:
+        outcome = Outcome.INTERRUPTED
+        sentence = (
+            f"this assembly was followed as far as {where}, when {time_is_over()}; go on from there, or give more time"
         )
-    if ending is TrackingEnd.WORK_LIMIT:
-        return NoAnswer(
-            Outcome.BRANCH_LOST,
+    elif ending is TrackingEnd.WORK_LIMIT:
+        sentence = (
             f"this assembly was followed as far as {where}, which took all the work that one answer may; stop there "
-            f"and go on from there, divide the range into more steps, or drive {drive}",
+            f"and go on from there, divide the range into more steps, or drive {drive}"
         )
-    meet = f"motions of {_links(links)} meet" if links else "motions meet"
-    return NoAnswer(
-        Outcome.BRANCH_LOST,
-        f"this assembly can be followed only to {where}: there {meet} that cannot be told apart; stop short of it, or "
-        f"drive {drive}",
-    )
+    else:
+        motions = f"motions of {_links(links)} meet" if links else "motions meet"
+        sentence = (
+            f"this assembly can be followed only to {where}: there {motions} that cannot be told apart; stop short of "
+            f"it, or drive {drive}"
+        )
+    return NoAnswer(outcome, sentence)
 
 
 def motion_stopped(setup: PreparedMechanism, met: str, where: str) -> NoAnswer:
@@ -288,21 +282,19 @@ def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") ->
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{at or setup.describe_position()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the "
-        "mechanism's size where "
-        f"rounding explains {setup.tolerance:.2g}; change a length or the input a little",
+        f"mechanism's size where rounding explains {setup.tolerance:.2g}; change a length or the input a little",
     )
 
 
 def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
     apart = amount(gap, "length", setup.mechanism.units)
-    told = f"are {apart} from touching" if gap > CONTACT_TOLERANCE * setup.unit else "touch in passing only"
-    known = setup.pairs[pair].open_contact_hint
+    state = f"are {apart} from touching" if gap > CONTACT_TOLERANCE * setup.unit else "touch in passing only"
+    hint = setup.pairs[pair].open_contact_hint
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.describe_position()} {_links(setup.pairs[pair].links)} of pair {pair!r} {told}; let pins or "
-        "guides keep them in "
-        f"contact{f' ({known})' if known else ''}",
+        f"{setup.describe_position()} {_links(setup.pairs[pair].links)} of pair {pair!r} {state}; let pins or guides "
+        f"keep them in contact{f' ({hint})' if hint else ''}",
     )
 
 
@@ -315,17 +307,17 @@ def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailur
     """What to say of a block that cannot be joined; what would mend it takes as long to find as an assembly."""
     stage = failure.stage
     gaps: dict[str, float] = {}
-    still = setup.functions.block_call(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0][0]
-    for row, left in zip(setup.equations.rows[stage.rows], still, strict=True):
-        gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), left))
+    residuals = setup.functions.block_call(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0][0]
+    for row, residual in zip(setup.equations.rows[stage.rows], residuals, strict=True):
+        gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), residual))
     pair = max(gaps, key=lambda name: gaps[name])
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
-    by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
+    unit, quantity = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
     cut_off = f" (the search stopped after {failure.effort:.0f} steps)" if failure.is_cut_off else ""
     return (
         f"{setup.describe_position()} {links} cannot be joined{cut_off}: at the nearest, pair {pair!r} stays open by "
-        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; {_remedy(setup, failure, links)}"
+        f"{amount(gaps[pair] * unit, quantity, setup.mechanism.units)}; {_remedy(setup, failure, links)}"
     )
 
 
@@ -340,7 +332,7 @@ def _remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, links: str
 
 def _search_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, otherwise: str) -> str:
     """A change of one number that lets the block close, or a misfit to accept; `otherwise` where there is neither."""
-    from planar.solving.assembly.least_misfit_offer import offer_least_misfit
+    from planar.solving.assembly.least_misfit import offer_least_misfit
     from planar.solving.diagnosis.remedy import describe_remedy
 
     remedy = describe_remedy(setup, failure, otherwise)
@@ -360,25 +352,23 @@ def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:
 
 def _surplus_inputs(setup: PreparedMechanism) -> str:
     """What to say of inputs that move one another while other links are free."""
-    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
-
-    sets = find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
+    sets = redundancy.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
     return f", and leave one out of those at {quote_names(sets[0])}, which move one another" if sets else ""
 
 
 def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     """Which inputs conflict, and what to do about it."""
-    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
-
-    sets = find_conflicting_inputs(setup)
+    sets = redundancy.find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
-    told = [
-        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quote_names(each)} move one another"
-        for each in sets[:3]
+    clauses = [
+        f"the input at {pairs[0]!r} cannot move"
+        if len(pairs) == 1
+        else f"those at {quote_names(pairs)} move one another"
+        for pairs in sets[:3]
     ]
     which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
-    return f": {join_all_names(told)}; leave {which} out"
+    return f": {join_all_names(clauses)}; leave {which} out"
 
 
 def disagreeing_inputs(setup: PreparedMechanism, mobility: int, what: str) -> NoAnswer:
@@ -410,12 +400,8 @@ def _inputs_at(pairs: Sequence[str]) -> str:
     return f"the input{'s' * (len(pairs) != 1)} at {quote_names(pairs)}"
 
 
-def _freedoms(setup: PreparedMechanism, mobility: int) -> str:
-    return f"{count_phrase(mobility, 'freedom')} for {count_phrase(len(setup.mechanism.inputs), 'input')}"
-
-
-def _offered_pairs(setup: PreparedMechanism, links: Sequence[str], most: int) -> str:
+def _offered_pairs(setup: PreparedMechanism, links: Sequence[str], maximum: int) -> str:
     """Pairs of these links that have no input, to be offered."""
     taken = {given.pair for given in setup.mechanism.inputs}
     offered = [name for name, pair in setup.pairs.items() if set(pair.links) & set(links) and name not in taken]
-    return " or ".join(map(repr, offered[:most])) or "another pair"
+    return " or ".join(map(repr, offered[:maximum])) or "another pair"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -13,16 +13,15 @@ import numpy as np
 
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
-from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.foundation.errors import PlanarError
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
-from planar.solving.assembly.block_assemblies import BlockAssemblies, block_residual_function
+from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
-from planar.solving.newton import ResidualFunction, correct_blocks, damped_newton
+from planar.solving.newton import ResidualFunction, block_residual_function, correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_DIMENSIONS = 40
@@ -54,37 +53,12 @@ CHANGE_EFFORT, MOVED_BLOCK_EFFORT = 3.0, 0.5
 """What it takes to change a number, and to move each earlier block on from where it was, in steps."""
 
 
-class EffortSpent(Exception):
+class _EffortSpent(Exception):
     """A search would take more effort than it may."""
 
 
-class EffortBudget:
-    """How many steps of Newton's method may still be taken."""
-
-    def __init__(self, steps: float):
-        self.steps_left = steps
-
-    def spend(self, steps: float) -> None:
-        """Count steps. Raises EffortSpent where none are left."""
-        self.steps_left -= steps
-        if self.steps_left < 0.0:
-            raise EffortSpent
-
-
-class _BudgetedAssemblies(BlockAssemblies):
-    """Candidates for which effort is spent."""
-
-    def __init__(self, setup: PreparedMechanism, budget: EffortBudget):
-        super().__init__(setup)
-        self._budget = budget
-
-    def _count_effort(self, steps: float) -> None:
-        super()._count_effort(steps)
-        self._budget.spend(steps)
-
-
 class RemedyChange(NamedTuple):
-    """A dimension, or the input at a pair, at another value (m or rad), with which the whole goes together."""
+    """A dimension, or the input at a pair, at another value (m or rad), with which the mechanism can be assembled."""
 
     name: str
     kind: str
@@ -92,7 +66,7 @@ class RemedyChange(NamedTuple):
     was: float
     value: float
     shown: str
-    "the value with its unit; the whole goes together with it as it stands there"
+    "the value with its unit; the mechanism can be assembled with it as it stands there"
 
 
 @dataclass(frozen=True)
@@ -104,7 +78,7 @@ class _ChangeableNumber:
     was: float
     size: float
     "what is large for it (m or rad)"
-    least: float
+    minimum: float
     change: Callable[[float], Mechanism]
 
     def changed(self, value: float) -> Mechanism | None:
@@ -122,253 +96,215 @@ def describe_remedy(setup: PreparedMechanism, failure: AssemblySearchFailure, ot
     A change is offered only after the mechanism with it, rounded as it is printed, has been assembled. The clause says
     where the search was cut off.
     """
-    budget = EffortBudget(MAX_EFFORT)
-    beside = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
-    links = frozenset((*failure.stage.links, *beside))
-    told, cut = [], False
+    search = RemedySearch(setup, failure, max_effort=MAX_EFFORT)
+    neighbours = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
+    clauses, is_cut_off = [], False
     try:
-        for change in islice(mending_inputs(setup, failure, budget=budget), 1):
-            told.append(f"at {change.name} = {change.shown}")
-        for change in islice(mending_dimensions(setup, failure, links, budget=budget), 1):
+        for change in islice(search.positions(), 1):
+            clauses.append(f"at {change.name} = {change.shown}")
+        for change in islice(search.dimensions(frozenset((*failure.stage.links, *neighbours))), 1):
             was = amount(change.was, change.kind, setup.mechanism.units)
-            told.insert(0, f"with {change.name} = {change.shown} instead of {was}")
-    except EffortSpent:
-        cut = True
-    if told:
-        return f"it would go together {', or '.join(told)}"
-    return f"{otherwise} (the search for a single change that helps was cut off)" if cut else otherwise
+            clauses.insert(0, f"with {change.name} = {change.shown} instead of {was}")
+    except _EffortSpent:
+        is_cut_off = True
+    if clauses:
+        return f"it would go together {', or '.join(clauses)}"
+    return f"{otherwise} (the search for a single change that helps was cut off)" if is_cut_off else otherwise
 
 
-def mending_dimensions(
-    setup: PreparedMechanism,
-    failure: AssemblySearchFailure,
-    links: frozenset[str],
-    thorough: bool = False,
-    budget: EffortBudget | None = None,
-) -> Iterator[RemedyChange]:
-    """Changes of one dimension of these links each that let the whole go together, the least first.
+class RemedySearch:
+    """The search for changes of one number each that let a mechanism be assembled, the least first.
 
-    Each is the least with which the assembly goes together that comes nearest without it; only a `thorough` search
-    looks whether another does with less, and tries all changes on the whole. Raises EffortSpent where there is an
-    end to the `budget`.
+    Each is the least with which the assembly closes that comes nearest without it; only a `thorough` search looks
+    whether another does with less, and tries all changes on the whole mechanism. Where `max_effort` is spent (steps of
+    Newton's method) its iterators raise _EffortSpent.
     """
-    mechanism = setup.mechanism
-    return _smallest_changes_first(
-        setup,
-        failure,
-        [
+
+    def __init__(
+        self,
+        setup: PreparedMechanism,
+        failure: AssemblySearchFailure,
+        thorough: bool = False,
+        max_effort: float = np.inf,
+    ):
+        self.setup, self.failure, self.thorough = setup, failure, thorough
+        self._effort_left = max_effort
+
+    def dimensions(self, links: frozenset[str]) -> Iterator[RemedyChange]:
+        """Changes of one dimension of these links each."""
+        mechanism = self.setup.mechanism
+        return self._smallest_first(
             _ChangeableNumber(
-                each.name,
+                length.name,
                 "length",
-                each.value,
-                setup.unit,
-                0.0 if each.name == f"{each.link}.length" else -np.inf,
-                partial(change_dimension, mechanism, each),
+                length.value,
+                self.setup.unit,
+                0.0 if length.name == f"{length.link}.length" else -np.inf,
+                partial(change_dimension, mechanism, length),
             )
-            for each in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
-        ],
-        thorough,
-        budget or EffortBudget(np.inf),
-    )
+            for length in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
+        )
 
-
-def mending_inputs(
-    setup: PreparedMechanism,
-    failure: AssemblySearchFailure,
-    inputs: Collection[str] | None = None,
-    thorough: bool = False,
-    budget: EffortBudget | None = None,
-) -> Iterator[RemedyChange]:
-    """Positions of one input each, of these or of all, at which the whole goes together: as `mending_dimensions`."""
-    mechanism = setup.mechanism
-    return _smallest_changes_first(
-        setup,
-        failure,
-        [
+    def positions(self, inputs: Collection[str] | None = None) -> Iterator[RemedyChange]:
+        """Positions of one input each, of these or of all."""
+        setup = self.setup
+        return self._smallest_first(
             _ChangeableNumber(
                 given.pair,
                 "length" if setup.is_sliding(given.pair) else "angle",
                 given.position,
-                setup.unit if setup.is_sliding(given.pair) else 1.0,
+                size,
                 -np.inf,
-                partial(_with_input_at, mechanism, given.pair),
+                partial(_with_input_at, setup.mechanism, given.pair),
             )
-            for given in mechanism.inputs
+            for given, size in zip(setup.mechanism.inputs, setup.input_scale.tolist(), strict=True)
             if inputs is None or given.pair in inputs
-        ],
-        thorough,
-        budget or EffortBudget(np.inf),
-    )
+        )
+
+    def _spend(self, steps: float) -> None:
+        self._effort_left -= steps
+        if self._effort_left < 0.0:
+            raise _EffortSpent
+
+    def _smallest_first(self, numbers: Iterable[_ChangeableNumber]) -> Iterator[RemedyChange]:
+        changes = []
+        for number in numbers:
+            value = self._closing_value(number)
+            if value is not None:
+                if self.thorough:
+                    value = self._first_closed(number, number.was, value, 1.0 - SMALLER_CHANGE_RATIO, self._can_close)
+                changes.append((abs(value - number.was) / number.size, number, value))
+        # of changes that are as small, that of a link's length
+        changes.sort(key=lambda change: (round(change[0], 6), not change[1].name.endswith(".length")))
+        units = self.setup.mechanism.units
+        for _, number, value in changes if self.thorough else changes[:MAX_CHANGES_TRIED]:
+            name = units.length if number.kind == "length" else units.angle
+            unit = parse_unit(name)
+            exact = 0.0 if abs(value) <= ROUNDING_TOLERANCE * number.size else unit.from_si(value)
+            # first a little beyond, where it closes with ease; what is held twice needs the very value
+            for shown in (
+                f"{_rounded_beyond(exact, value > number.was):.6g}",
+                f"{exact:.{PRINTED_DIGITS}g}",
+                f"{exact:.{ALL_DIGITS}g}",
+            ):
+                rounded = unit.to_si(float(shown))
+                if self._can_close(number, rounded):
+                    yield RemedyChange(number.name, number.kind, number.was, rounded, f"{shown} {name}")
+                    break
+
+    def _can_close(self, number: _ChangeableNumber, value: float) -> bool:
+        """Whether the mechanism can be assembled at its inputs with a number at a value."""
+        mechanism = number.changed(value)
+        if mechanism is None:
+            return False
+        try:
+            assemblies = BlockAssemblies(PreparedMechanism(mechanism), spend=self._spend)
+        except PointPlacementError:
+            return False
+        return isinstance(find_nearest_assembly(assemblies), Assembly)
+
+    def _closing_value(self, number: _ChangeableNumber) -> float | None:
+        """The value (m or rad) of a number at which what stays open just closes; None where there is none.
+
+        What stays open at the nearest position falls as the number changes by its share in it: Newton's method for a
+        zero of the distance, the position being solved again at each step.
+        """
+        value, z, nudge = number.was, self.failure.z, 1e-7 * number.size
+        open_value, direction, tolerance, retreats = number.was, 0.0, CLOSED_TOLERANCE, 0
+        closed_value: float | None = None
+        for _ in range(MAX_NEWTON_STEPS):
+            block = self._changed_block(number.changed(value), z)
+            beside = block and self._changed_block(number.changed(value + nudge), z)
+            if block is None or beside is None:
+                if retreats == MAX_HALVINGS:
+                    break
+                value, retreats = 0.5 * (open_value + value), retreats + 1  # the blocks before it do not close there
+                continue
+            nearest, residuals = self._nearest(*block)
+            gap = float(np.linalg.norm(residuals))
+            if closed_value is not None and gap > tolerance:
+                break
+            change = beside[0](nearest[None, self.failure.stage.unknowns])[0][0] - residuals
+            slope = float(residuals @ change) / (gap or 1.0) / nudge
+            direction = direction or -np.sign(slope)
+            if gap <= tolerance:
+                closed_value, tolerance = value, MIN_DECREASE * gap
+            elif direction * slope > 0.0:
+                value = 0.5 * (open_value + value)  # it went over where it closes, and out on the other side
+                continue
+            else:
+                open_value, z = value, nearest
+            if abs(slope) * number.size < MIN_SENSITIVITY:
+                if closed_value is not None or value != number.was:
+                    break  # it hardly matters here, or nothing is left open
+                # where it is farthest off it may yet matter
+                value, direction = number.was + NEIGHBOUR_RATIO * number.size, 0.0
+                continue
+            step = float(np.clip(-gap / slope, -MAX_STEP * number.size, MAX_STEP * number.size))
+            value = max(value + step, 0.5 * (value + number.minimum))
+        if closed_value is None or closed_value == number.was:
+            return None
+
+        def is_closed(number: _ChangeableNumber, value: float) -> bool:
+            block = self._changed_block(number.changed(value), z)
+            return block is not None and float(np.linalg.norm(self._nearest(*block)[1])) <= CLOSED_TOLERANCE
+
+        # the last step of Newton's method may have gone too far
+        return self._first_closed(number, open_value, closed_value, OVERSHOOT_RATIO, is_closed)
+
+    def _first_closed(
+        self,
+        number: _ChangeableNumber,
+        open_value: float,
+        closed_value: float,
+        share: float,
+        is_closed: Callable[[_ChangeableNumber, float], bool],
+    ) -> float:
+        """Of a value of a number that is open and one that is closed, the one between them where that changes; the
+        closed one itself where a `share` of the way back is open already."""
+        part = share
+        while abs(closed_value - open_value) > ROUNDING_TOLERANCE * number.size:
+            value = closed_value + part * (open_value - closed_value)
+            if is_closed(number, value):
+                closed_value = value
+            elif part == share:
+                break
+            else:
+                open_value = value
+            part = 0.5
+        return closed_value
+
+    def _changed_block(self, mechanism: Mechanism | None, z: Array) -> tuple[ResidualFunction, Array] | None:
+        """The constraints of the block that stays open in a mechanism with other numbers, and all unknowns
+        (unknowns,), those before the block moved on from z; None where they cannot be."""
+        setup, block = self.setup, self.failure.stage
+        self._spend(CHANGE_EFFORT + MOVED_BLOCK_EFFORT * block.block_index)
+        if mechanism is None:
+            return None
+        try:
+            p = pair_numbers(mechanism, shapes_of_links(mechanism), setup.unit)
+        except PointPlacementError:
+            return None
+        u = np.array([given.position for given in mechanism.inputs]) / setup.input_scale
+        moved = correct_blocks(setup.functions, p, z, u, block.block_index - 1)
+        return None if moved is None else (block_residual_function(setup.functions, block, moved, u, p), moved)
+
+    def _nearest(self, residual_function: ResidualFunction, z: Array) -> tuple[Array, Array]:
+        """All unknowns (unknowns,), those of the block where it is nearest to closing, and what it leaves open
+        (rows,)."""
+        unknowns = self.failure.stage.unknowns
+        result = damped_newton(residual_function, z[None, unknowns])
+        self._spend(result.steps)
+        nearest = z.copy()
+        nearest[unknowns] = result.unknowns[0]
+        return nearest, residual_function(result.unknowns)[0][0]
 
 
 def _with_input_at(mechanism: Mechanism, pair: str, position: float) -> Mechanism:
     return replace_inputs(mechanism, (Drive(pair, position),))
 
 
-def _smallest_changes_first(
-    setup: PreparedMechanism,
-    failure: AssemblySearchFailure,
-    numbers: list[_ChangeableNumber],
-    thorough: bool,
-    budget: EffortBudget,
-) -> Iterator[RemedyChange]:
-    found = []
-    for number in numbers:
-        value = _closing_value(setup, failure, number, budget)
-        if value is not None:
-            value = _smaller_value(number, value, budget) if thorough else value
-            found.append((abs(value - number.was) / number.size, number, value))
-    # of changes that are as small, that of a link's length
-    found.sort(key=lambda each: (round(each[0], 6), not each[1].name.endswith(".length")))
-    units = setup.mechanism.units
-    for _, number, value in found if thorough else found[:MAX_CHANGES_TRIED]:
-        name = units.length if number.kind == "length" else units.angle
-        by = parse_unit(name)
-        near = 0.0 if abs(value) <= ROUNDING_TOLERANCE * number.size else by.from_si(value)
-        # first a little beyond, where it goes together with ease; what is held twice needs the very value
-        for shown in (
-            f"{_rounded_beyond(near, value > number.was):.6g}",
-            f"{near:.{PRINTED_DIGITS}g}",
-            f"{near:.{ALL_DIGITS}g}",
-        ):
-            there = by.to_si(float(shown))
-            if can_be_assembled(number.changed(there), budget):
-                yield RemedyChange(number.name, number.kind, number.was, there, f"{shown} {name}")
-                break
-
-
-def _smaller_value(number: _ChangeableNumber, value: float, budget: EffortBudget) -> float:
-    """A value at which another assembly just goes together, if less of the change will do for that."""
-    open_, closed = number.was, number.was + SMALLER_CHANGE_RATIO * (value - number.was)
-    if not can_be_assembled(number.changed(closed), budget):
-        return value
-    while abs(closed - open_) > ROUNDING_TOLERANCE * number.size:
-        tried = 0.5 * (open_ + closed)
-        open_, closed = (open_, tried) if can_be_assembled(number.changed(tried), budget) else (tried, closed)
-    return closed
-
-
-def _closing_value(
-    setup: PreparedMechanism, failure: AssemblySearchFailure, number: _ChangeableNumber, budget: EffortBudget
-) -> float | None:
-    """The value (m or rad) of a number at which what stays open just closes; None where there is none.
-
-    What stays open at the nearest position falls as the number changes by its share in it: Newton's method for a zero
-    of the distance, the position being found anew at each step.
-    """
-    value, z, nudge = number.was, failure.z, 1e-7 * number.size
-    open_at, way, least, found, retreats = number.was, 0.0, CLOSED_TOLERANCE, None, 0
-    for _ in range(MAX_NEWTON_STEPS):
-        here = _changed_block(setup, failure.stage, number.changed(value), z, budget)
-        beside = here and _changed_block(setup, failure.stage, number.changed(value + nudge), z, budget)
-        if here is None or beside is None:
-            if retreats == MAX_HALVINGS:
-                break
-            value, retreats = 0.5 * (open_at + value), retreats + 1  # there the blocks before it do not close
-            continue
-        nearest = here.nearest_unknowns()
-        gap = float(np.linalg.norm(here.residuals(nearest)))
-        if found is not None and gap > least:
-            break
-        slope = (
-            float(here.residuals(nearest) @ (beside.residuals(nearest) - here.residuals(nearest)))
-            / (gap or 1.0)
-            / nudge
-        )
-        way = way or -np.sign(slope)
-        if gap <= least:
-            found, least = value, MIN_DECREASE * gap
-        elif way * slope > 0.0:
-            value = 0.5 * (open_at + value)  # it went over where it closes, and out on the other side
-            continue
-        else:
-            open_at, z = value, nearest
-        if abs(slope) * number.size < MIN_SENSITIVITY:
-            if found is not None or value != number.was:
-                break  # it hardly matters here, or nothing is left open
-            value, way = number.was + NEIGHBOUR_RATIO * number.size, 0.0  # where it is farthest off it may yet matter
-            continue
-        step = float(np.clip(-gap / slope, -MAX_STEP * number.size, MAX_STEP * number.size))
-        value = max(value + step, 0.5 * (value + number.least))
-    if found is None or found == number.was:
-        return None
-    return _closing_boundary(setup, failure.stage, number, (open_at, found), z, budget)
-
-
-def _closing_boundary(
-    setup: PreparedMechanism,
-    stage: Block,
-    number: _ChangeableNumber,
-    between: tuple[float, float],
-    z: Array,
-    budget: EffortBudget,
-) -> float:
-    """Of a value at which a block is open and one at which it is closed, the one between them where that changes.
-
-    The last step of Newton's method may have gone too far.
-    """
-    open_, closed = between
-    part = OVERSHOOT_RATIO
-    while abs(closed - open_) > ROUNDING_TOLERANCE * number.size:
-        tried = closed + part * (open_ - closed)
-        there = _changed_block(setup, stage, number.changed(tried), z, budget)
-        gap = np.inf if there is None else float(np.linalg.norm(there.residuals(there.nearest_unknowns())))
-        if gap > CLOSED_TOLERANCE and part == OVERSHOOT_RATIO:
-            break
-        open_, closed = (tried, closed) if gap > CLOSED_TOLERANCE else (open_, tried)
-        part = 0.5
-    return closed
-
-
-class _ChangedBlock:
-    """What a block leaves open when numbers have been changed, the blocks before it standing where they then do."""
-
-    def __init__(self, residual_function: ResidualFunction, stage: Block, z: Array, budget: EffortBudget):
-        self._residual_function, self._stage, self._z, self._budget = residual_function, stage, z, budget
-
-    def nearest_unknowns(self) -> Array:
-        """All unknowns (unknowns,), those of the block where it is nearest to closing. Raises EffortSpent."""
-        result = damped_newton(self._residual_function, self._z[None, self._stage.unknowns])
-        self._budget.spend(result.steps)
-        z = self._z.copy()
-        z[self._stage.unknowns] = result.unknowns[0]
-        return z
-
-    def residuals(self, z: Array) -> Array:
-        """What is left open (rows,) with the block's unknowns as in z (unknowns,)."""
-        return self._residual_function(z[None, self._stage.unknowns])[0][0]
-
-
-def _changed_block(
-    setup: PreparedMechanism, stage: Block, mechanism: Mechanism | None, z: Array, budget: EffortBudget
-) -> _ChangedBlock | None:
-    """A block of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
-    budget.spend(CHANGE_EFFORT + MOVED_BLOCK_EFFORT * stage.block_index)
-    if mechanism is None:
-        return None
-    try:
-        p = pair_numbers(mechanism, shapes_of_links(mechanism), setup.unit)
-    except PointPlacementError:
-        return None
-    by = [setup.unit if slides else 1.0 for slides in setup.structure.input_slides]
-    u = np.array([given.position / size for given, size in zip(mechanism.inputs, by, strict=True)])
-    moved = correct_blocks(setup.functions, p, z, u, stage.block_index - 1)
-    if moved is None:
-        return None
-    return _ChangedBlock(block_residual_function(setup.functions, stage, moved, u, p), stage, moved, budget)
-
-
 def _rounded_beyond(value: float, up: bool) -> float:
     """A number of DIGITS digits beyond the value, seen from where it comes."""
     size = 10.0 ** (floor(log10(abs(value))) + 1 - PRINTED_DIGITS) if value else 1.0
     return (ceil if up else floor)(value / size) * size
-
-
-def can_be_assembled(mechanism: Mechanism | None, budget: EffortBudget) -> bool:
-    """Whether there is a mechanism and it can be assembled at its inputs. Raises EffortSpent."""
-    if mechanism is None:
-        return False
-    try:
-        return isinstance(find_nearest_assembly(_BudgetedAssemblies(PreparedMechanism(mechanism), budget)), Assembly)
-    except PointPlacementError:
-        return False

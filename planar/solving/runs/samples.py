@@ -10,17 +10,16 @@ import numpy as np
 from planar.equations.acceptance import InputSamples
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
-from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import Motion
 from planar.results.records import InputMotion, Limit, ThirdRates
-from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR
+from planar.solving.checks.residual_check import CONTACT_TOLERANCE, MAX_RATE_ERROR, stack_motion
 from planar.solving.continuation.events import change_point_remarks
 from planar.solving.continuation.run_samples import InputRates, RunSamples
 from planar.solving.diagnosis import refusals
-from planar.solving.lazy_frames import lazy_frames
 from planar.solving.position import PositionSolver
+from planar.solving.prepared_mechanism import lazy_frames
 from planar.solving.rates.sample_rates import AccuracyDoubts, sample_rates
 
 
@@ -98,7 +97,7 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
     beyond = np.flatnonzero(~passed)
     if not beyond.size:
         return run
-    refusal = misfit_refusal(solver, run.z, run.inputs.u, int(beyond[0]))
+    refusal = misfit_refusal(solver, run.z[beyond[0]], run.inputs.u[beyond[0]])
     assert refusal is not None
     if not beyond[0]:
         raise refusal
@@ -142,12 +141,11 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
         part[list(run.dead_points)] = np.nan
     if doubt is not None:
         remarks += _remove_inexact_rates(solver, inputs, parts, doubt, is_part)
-    frames, coordinates = lazy_frames(solver, parts[:3])
+    motion = stack_motion(parts[:3], inputs[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
-    jets = [Jet(*rates) for rates in _input_motions(solver, inputs)]
-    gaps_of_rates = solver.residual_check.rate_residuals(frames, coordinates, jets)
+    gaps_of_rates = solver.structure.residual_check.rate_residuals(motion, solver.inputs.p)
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
-        of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
+        of_rows = np.where(determined, broken, 0.0)
         wrong = of_rows > 1e3 * solver.tolerance
         if not wrong.any():
             continue
@@ -159,7 +157,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
             part[wrong] = np.nan
         remarks = (*remarks, f"{place} no rates are given: they would break pair {pair!r}, next to a change point")
         determined &= ~wrong
-    solver.refuse_open_contact(frames, coordinates)
+    solver.refuse_open_contact(motion)
     return parts, residual, remarks
 
 

@@ -18,8 +18,8 @@ from planar.model.mechanism import Drive, Mechanism, named_points, relative_moti
 from planar.model.pairs import MeasureKind
 from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.solution_curve import Arc
-from planar.solving.lazy_frames import LazyFrames
 from planar.solving.position import PositionSolver, solved_mechanism
+from planar.solving.prepared_mechanism import LazyFrames
 from planar.solving.rates.regularity import jacobian_at, regularity
 from planar.synthesis.judgement.defects import ONE_BRANCH, ONE_CIRCUIT, REACH, Defect
 from planar.synthesis.judgement.input_range import InputRange
