@@ -89,7 +89,7 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     first = int(good[0])
     near = [row - PART.start for row in motion.course.singular_rows if row >= PART.start]
     assert first == len(out) or min(near, default=0) <= first + 2
-    unit = motion.course.ranged.solver.unit
+    unit = PositionSolver(motion.mechanism).unit
     for order, what in enumerate(("position", "velocity", "acceleration")):
         for k, point in enumerate(points):
             wanted = getattr(motion.point(point), what)[PART][:first]
@@ -112,7 +112,7 @@ def test_a_run_from_signs_is_that_from_the_unknowns(stem, at_two):
     """Of designs at one input, or at two; one starts nowhere, and of another the assembly is to be found yet."""
     motion = planar.cycle(MODELS[stem])
     given = repeated(arguments(motion, motion.point_names[-1:]), 20)
-    one, other = given.z0[:, 0], motion.course.found.z[PART][1]
+    one, other = given.z0[:, 0], motion.course.unknowns[PART][1]
     step = given.input_offsets[1]
     if at_two:
         given.u0[:, 7], given.z0[:, 7] = given.u0[:, 7] + step, other
@@ -181,7 +181,7 @@ def test_assemblies_are_corrected_and_steps_come_to_the_unknowns_as_by_the_equat
     assert corrected.converged.all()
     np.testing.assert_allclose(np.exp(1j * corrected.z), np.exp(1j * wanted.T), atol=1e-10)
     steps = np.array([1, 20, 100])
-    wanted = motion.course.found.z[PART][steps - 1]
+    wanted = motion.course.unknowns[PART][steps - 1]
     np.testing.assert_allclose(np.exp(1j * runs.last_good_unknowns(given, steps)), np.exp(1j * wanted.T), atol=1e-9)
 
 
