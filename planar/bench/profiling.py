@@ -24,7 +24,7 @@ SWEEP_PARTS: dict[FunctionKey, str] = {
 
 
 CYCLE_PARTS: dict[FunctionKey, str] = {
-    ("equations", "acceptance.py", "_move"): "computing blocks",
+    ("equations", "acceptance.py", "_judge_blocks"): "computing blocks",
     ("equations", "acceptance.py", "_solve_run"): "solving blocks",
     ("equations", "acceptance.py", "_judge_by_one_formula"): "rates and the residual check",
     ("equations", "constraint_check.py", "judge"): "the residual check",
