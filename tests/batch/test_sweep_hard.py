@@ -229,7 +229,11 @@ def test_a_gap_between_two_steps_is_not_passed_over(steps):
     turned = np.sort(np.where(np.isnan(turned), np.inf, turned), axis=0)
     assert np.count_nonzero(turned[1] - turned[0] < 2.0 * np.pi / steps) > 300
     values = {"crank.length": a, "coupler.length": b, "rocker.length": c, "frame.D.x": g, "A.position": start}
-    swept = planar.sweep(bare_four_bar(1.2, 0.3, 0.25, 1.2, 0.2), values, steps, "C", rates=False)
+    base = bare_four_bar(1.2, 0.3, 0.25, 1.2, 0.2)
+    swept = planar.sweep(base, values, steps, "C", rates=False)
     np.testing.assert_allclose(np.nan_to_num(swept.dead_point - start, nan=np.inf), turned[0], atol=1e-8)
     solved = np.minimum(np.ceil(turned[0] / (2.0 * np.pi / steps)), steps + 1).astype(int)
     assert (np.asarray(swept.status) == 0).sum(axis=1).tolist() == solved.tolist()
+    run = planar.prepared(base, steps, "C", rates=False)
+    runs = [run(values_of_design(values, k)) for k in range(1500)]
+    assert [np.count_nonzero(np.asarray(one.status) == 0) for one in runs] == solved[:1500].tolist()
