@@ -46,6 +46,13 @@ def _output_direction(links: LinkMotion, output: tuple[str, Pair], driving: str)
     return end - fixed
 
 
+def can_drive(mechanism: Mechanism, pair: Pair, output: tuple[str, Pair]) -> bool:
+    """Whether a pair may pass a force from another moving link to the output, (link, pair)."""
+    link, output_pair = output
+    others = [body for body in pair.bodies if body not in (link, mechanism.frame)]
+    return link in pair.bodies and bool(others) and pair.entry_name() != output_pair.entry_name()
+
+
 def force_point(pair: Pair, link: str) -> tuple[str, str] | None:
     """The (link, point) where a pair's force on a link acts: of that link if it can be."""
     members = [member for member in pair.coincident_points() if member[0] == link]
