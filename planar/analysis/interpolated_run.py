@@ -72,14 +72,14 @@ class InterpolatedRun:
         """The state at a position of the running input, on this motion's branch. Raises NoAnswer."""
         if position not in self._states:
             index = int(np.argmin(np.where(self._is_on_branch(position), np.abs(self.positions - position), np.inf)))
-            there = self._solver_at(position)
-            start = there.inputs.u.copy()
-            start[self._running_index] = self.positions[index] / there.input_scale[self._running_index]
-            way = follow_samples(there, self.z[index], resting_inputs(np.stack([start, there.inputs.u])))
-            if way.stopped is not None:
-                raise way.stopped
-            z, local = way.z[-1], way.branch_rates.get(1)
-            self._states[position] = there.state(z) if local is None else there.state_on_branch(z, local)
+            solver = self._solver_at(position)
+            start = solver.inputs.u.copy()
+            start[self._running_index] = self.positions[index] / solver.input_scale[self._running_index]
+            run = follow_samples(solver, self.z[index], resting_inputs(np.stack([start, solver.inputs.u])))
+            if run.stopped is not None:
+                raise run.stopped
+            z, rates = run.z[-1], run.branch_rates.get(1)
+            self._states[position] = solver.state(z) if rates is None else solver.state_on_branch(z, rates)
         return self._states[position]
 
     def _is_on_branch(self, position: float) -> BoolArray:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from planar.dynamics.external_actions import LinkMotion
+from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar, atan2
 from planar.model.loads import Load
@@ -51,6 +52,13 @@ def can_drive(mechanism: Mechanism, pair: Pair, output: tuple[str, Pair]) -> boo
     link, output_pair = output
     others = [body for body in pair.bodies if body not in (link, mechanism.frame)]
     return link in pair.bodies and bool(others) and pair.entry_name() != output_pair.entry_name()
+
+
+def undriven_output(link: str) -> BadInput:
+    """The error for an output link that no other moving link drives."""
+    return BadInput(
+        link, f"no other moving link drives {link}: its transmission angle is that of a link the rest drives"
+    )
 
 
 def force_point(pair: Pair, link: str) -> tuple[str, str] | None:

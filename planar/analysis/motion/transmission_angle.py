@@ -12,7 +12,7 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
-from planar.derivatives.transmission_system import can_drive, force_point
+from planar.derivatives.transmission_system import can_drive, force_point, undriven_output
 from planar.document.first_argument import takes_result
 from planar.equations.coordinates import FRAME_PARTS
 from planar.equations.sparse_matrices import SparseMatrices
@@ -161,7 +161,7 @@ class _DrivenOutput:
         w = np.atleast_2d(self.prepared.coordinates(moving.frames, moving.own))
         load = np.zeros(len(self.prepared.column))
         load[self.columns] = (*self.direction, 0.0) if self.slides else (0.0, 0.0, 1.0)
-        found: list[Array] = []
+        wrenches: list[Array] = []
         stuck = np.zeros(len(w), dtype=bool)
         for start in range(0, len(w), CHUNK_SIZE):
             chunk = slice(start, start + CHUNK_SIZE)
@@ -172,14 +172,13 @@ class _DrivenOutput:
                 np.einsum("ncr,nr->cn", _block(sides, self.columns, rows), multipliers[:, rows])
                 for rows in rows_of_pairs
             ]
-            found.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(sides)))
-        every = np.concatenate(found, axis=2)
-        greatest = np.abs(every).max(axis=(0, 1), initial=0.0)
+            wrenches.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(sides)))
+        all_wrenches = np.concatenate(wrenches, axis=2)
+        greatest = np.abs(all_wrenches).max(axis=(0, 1), initial=0.0)
         if not (greatest > NEGLIGIBLE_FORCE).any() and not stuck.all():
-            told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
-            raise BadInput(self.link, told)
+            raise undriven_output(self.link)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return dict(zip(self.driving_pairs, every / greatest, strict=True)), stuck
+            return dict(zip(self.driving_pairs, all_wrenches / greatest, strict=True)), stuck
 
     def _multipliers(self, sides: Array | SparseMatrices, load: Array) -> tuple[Array, BoolArray]:
         """Multipliers (n, rows) that balance a load (coordinates,) on slopes, transposed (n, coordinates, rows); which
@@ -233,12 +232,12 @@ class _DrivenOutput:
         places = {force_point(self.driving_pairs[name], self.link) for name in names}
         place = places.pop()
         if places or place is None:
-            told = (
+            reason = (
                 f"{self.link} is driven at {join_all_names(names)}, not at one pin"
                 if places
                 else f"wheels drive {self.link}"
             )
-            raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
+            raise BadInput(self.link, f"{reason}, so that no one line of force with one pin tells a transmission angle")
         fixed_pin = next(member for member in self.pair.coincident_points() if member[0] == moving.mechanism.frame)
         members = (place, fixed_pin)
         vectors = [moving.frames[link].to_world(moving.shapes[link].position(name)) for link, name in members]
@@ -246,8 +245,8 @@ class _DrivenOutput:
         arm = point - _values((moving.frames[self.link].x, moving.frames[self.link].y))
         couple = np.abs(force[2] - (arm[0] * force[1] - arm[1] * force[0]) / self.prepared.unit)
         if np.max(couple[~np.isnan(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
-            told = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
-            raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
+            reason = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
+            raise BadInput(self.link, f"{reason}, so that no line of force through one pin tells a transmission angle")
         lever: Array = point - pin
         if np.hypot(*lever).max() <= NEGLIGIBLE_FORCE * self.prepared.unit:
             raise BadInput(self.link, f"{self.link} is driven at its fixed pin, about which no force turns it")
@@ -257,10 +256,10 @@ class _DrivenOutput:
         """The unit direction (2,) in which the output slides on the frame: how its place goes with the displacement."""
         w = np.atleast_2d(self.prepared.coordinates(moving.frames, moving.own))
         sides = self.constraints.transposed_jacobians(w[:1], self.inputs)
-        own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
-        way = _block(sides, slice(own, own + 1), self.rows_of_pair[self.pair.name][:2])[0, 0]
-        found: Array = way / np.hypot(*way)
-        return found
+        column = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
+        direction = _block(sides, slice(column, column + 1), self.rows_of_pair[self.pair.name][:2])[0, 0]
+        unit_direction: Array = direction / np.hypot(*direction)
+        return unit_direction
 
 
 def _block(matrices: Array | SparseMatrices, rows: slice, columns: Sequence[int]) -> Array:
