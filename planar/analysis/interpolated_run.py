@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 from math import pi
 
 import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.geometry import Frame, frame_at
+from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.pairs import MeasureKind
@@ -18,7 +19,7 @@ from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_samples
 from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
-from planar.solving.runs.continuous_run import rows_with_rates, run_unknowns
+from planar.solving.runs.continuous_run import moving_jets, rows_with_rates, run_unknowns
 
 CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""
@@ -43,9 +44,6 @@ class InterpolatedRun:
         self.mechanism = replace_inputs(motion.mechanism, (Drive(self.pair, None, self.rate, 0.0),))
         self.solver = PositionSolver(self.mechanism)
         self._running_index = [each.pair for each in self.mechanism.inputs].index(self.pair)
-        self._input_scale = (
-            self.solver.unit if self.solver.relative_motions[self.pair].input_kind is MeasureKind.LENGTH else 1.0
-        )
         self.positions: Array = motion.inputs[self.pair].position
         self.lowest, self.highest = float(self.positions.min()), float(self.positions.max())
         self.z = run_unknowns(self.solver, motion)
@@ -74,14 +72,14 @@ class InterpolatedRun:
         """The state at a position of the running input, on this motion's branch. Raises NoAnswer."""
         if position not in self._states:
             index = int(np.argmin(np.where(self._is_on_branch(position), np.abs(self.positions - position), np.inf)))
-            there = self._solver_at(position)
-            start = there.inputs.u.copy()
-            start[self._running_index] = self.positions[index] / self._input_scale
-            way = follow_samples(there, self.z[index], resting_inputs(np.stack([start, there.inputs.u])))
-            if way.stopped is not None:
-                raise way.stopped
-            z, local = way.z[-1], way.branch_rates.get(1)
-            self._states[position] = there.state(z) if local is None else there.state_on_branch(z, local)
+            solver = self._solver_at(position)
+            start = solver.inputs.u.copy()
+            start[self._running_index] = self.positions[index] / solver.input_scale[self._running_index]
+            run = follow_samples(solver, self.z[index], resting_inputs(np.stack([start, solver.inputs.u])))
+            if run.stopped is not None:
+                raise run.stopped
+            z, rates = run.z[-1], run.branch_rates.get(1)
+            self._states[position] = solver.state(z) if rates is None else solver.state_on_branch(z, rates)
         return self._states[position]
 
     def _is_on_branch(self, position: float) -> BoolArray:
@@ -154,43 +152,27 @@ class InterpolatedRun:
             position, rate, second = jet.parts
             return Jet(position, rate, second - rate * (acceleration / velocity))
 
-        frames = {
-            link: frame if frame.fixed else frame_at(*(steady(each) for each in (frame.x, frame.y, frame.angle)))
-            for link, frame in motion.frames.items()
-        }
-        own = {name: tuple(map(steady, jets)) for name, jets in motion.own.items()}
-        return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
+        return self._with_jets(motion, map(steady, moving_jets(motion)))
 
     def _samples_at_unit_rate(self, motion: Motion) -> Motion:
-        """The samples of a motion whose input stands still in the file, with rates."""
-        states: list[State | None] = []
-        for position, z in zip(self.positions.tolist(), self.z, strict=True):
+        """The samples of a motion whose input stands still in the file, with rates where these are known."""
+        jets = moving_jets(motion)
+        rates: Array = np.full((2, len(jets), len(self.positions)), np.nan)
+        for row, (position, z) in enumerate(zip(self.positions.tolist(), self.z, strict=True)):
             try:
-                here = PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
-                states.append(here.state(z))
+                state = PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),))).state(z)
             except NoAnswer:
-                states.append(None)
+                continue
+            rates[..., row] = np.array([jet.parts[1:] for jet in moving_jets(state)]).reshape(-1, 2).T
+        return self._with_jets(motion, (Jet(jet.parts[0], *rates[:, k]) for k, jet in enumerate(jets)))
 
-        def stacked(jets: list[Jet | None], before: Jet) -> Jet:
-            rates = [[np.nan if jet is None else jet.parts[k] for jet in jets] for k in (1, 2)]
-            return Jet(before.parts[0], *(np.array(rate) for rate in rates))
-
-        def frame(link: str, before: Frame) -> Frame:
-            if before.fixed:
-                return before
-            parts = ("x", "y", "angle")
-            return frame_at(
-                *(
-                    stacked([getattr(s.frames[link], part) if s else None for s in states], getattr(before, part))
-                    for part in parts
-                )
-            )
-
-        frames = {link: frame(link, before) for link, before in motion.frames.items()}
-        own = {
-            name: tuple(stacked([s.own[name][k] if s else None for s in states], jet) for k, jet in enumerate(jets))
-            for name, jets in motion.own.items()
+    def _with_jets(self, motion: Motion, jets: Iterator[Jet]) -> Motion:
+        """The samples with other jets, in the order of `moving_jets`."""
+        frames = {
+            link: frame if frame.fixed else frame_at(next(jets), next(jets), next(jets))
+            for link, frame in motion.frames.items()
         }
+        own = {name: tuple(islice(jets, len(coordinates))) for name, coordinates in motion.own.items()}
         return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
 
     def _is_closed(self) -> bool:

@@ -12,12 +12,15 @@ from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.runs import last_good_unknowns
 from planar.batch.march.stops import nearest_end
 from planar.equations.linear import solve_vectors
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
+from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.continuation.predictor_corrector import (
     FIRST_STEP,
     LONGEST_STEP,
-    MAX_TANGENT_TURN,
+    STEP_GROWTH,
+    first_step,
+    is_step_sound,
 )
+from planar.solving.continuation.solution_curve import CLOSED_TOLERANCE, MIN_COLUMN_NORM
 
 Array = np.ndarray
 
@@ -25,8 +28,6 @@ SHORTEST_STEP = 1e-6
 """Arc length (rad, sizes): a curve that asks for shorter steps is left to be followed by itself."""
 CROSSING_DISTANCE = 0.01
 """So near to where branches cross a design is left to be followed by itself."""
-DIFFERENCE_STEP = 1e-6
-CLOSED_TOLERANCE = 1e-10
 MAX_ARCS = 120
 DEAD_POINT_MARGIN = 1e-8
 """Parts of the run: so near to a dead point a step is left to be judged by itself."""
@@ -124,11 +125,11 @@ class _DesignCurves:
         rates = np.hstack([tangent[:, :-1], tangent[:, -1:] * self.direction])
         second = self.functions.kinematics(np.hstack([y[:, :-1], self.inputs(y)]), rates, 0.0 * rates).F2
         curvature = _solve_bordered(jacobian, tangent, -second, 0.0)
-        sizes = np.maximum(np.linalg.norm(jacobian, axis=1, keepdims=True), 1e-6)
+        sizes = column_norms(jacobian, MIN_COLUMN_NORM)[:, None]
         difference = (self.jacobians(y + DIFFERENCE_STEP * tangent) - jacobian) / sizes
         change = np.linalg.norm(difference, axis=(1, 2)) / DIFFERENCE_STEP
         least = np.linalg.svd(np.nan_to_num(jacobian / sizes), compute_uv=False).min(axis=1, initial=np.inf)
-        return _CurvePoints(y, tangent, curvature, least / np.maximum(change, 1e-300))
+        return _CurvePoints(y, tangent, curvature, singular_distance(least, change))
 
 
 def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) -> Array:
@@ -207,16 +208,13 @@ class _DeadPointTracker:
                     return
                 curves = _DesignCurves(self.batch, active, self.direction)
             bend = np.linalg.norm(points.curvature, axis=1)
-            step = np.minimum.reduce(
-                [step, np.full(len(step), LONGEST_STEP), 1.2 * points.regular_distance, 0.8 * MAX_TANGENT_TURN / bend]
-            )
+            step = first_step(np.minimum(step, LONGEST_STEP), points.regular_distance, bend)
             predicted = points.y + step[:, None] * points.tangent + 0.5 * step[:, None] ** 2 * points.curvature
             y, fine = curves.correct(predicted, points.tangent)
             after = curves.evaluate(y, points.tangent)
             length = np.linalg.norm(y - points.y, axis=1)
-            fine &= np.sum(after.tangent * points.tangent, axis=1) > np.cos(MAX_TANGENT_TURN)
-            fine &= SINGULAR_DISTANCE_RATIO * length < points.regular_distance + after.regular_distance
-            fine &= length < 2.0 * step
+            cosine = np.sum(after.tangent * points.tangent, axis=1)
+            fine &= is_step_sound(step, length, cosine, points.regular_distance + after.regular_distance)
             # an input that may have gone back and on again within the step
             dips = (points.curvature[:, -1] < 0.0) & (after.curvature[:, -1] > 0.0) & (after.tangent[:, -1] > 0.0)
             low = np.minimum(points.tangent[:, -1], after.tangent[:, -1])
@@ -233,7 +231,7 @@ class _DeadPointTracker:
             is_last = (end != PASSES) | (after.y[:, -1] >= self.limits[active])
             self.is_settled[active[fine & is_last]] = True
             self.arcs.append(arcs.select(fine))
-            step = np.where(fine, 1.6 * step, 0.5 * step)
+            step = np.where(fine, STEP_GROWTH * step, 0.5 * step)
             parts = zip(after, points, strict=True)
             points = _CurvePoints(*(np.where(fine.reshape(-1, *[1] * (new.ndim - 1)), new, old) for new, old in parts))
 

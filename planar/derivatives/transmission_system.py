@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from planar.dynamics.external_actions import LinkMotion
+from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar, atan2
 from planar.model.loads import Load
@@ -44,6 +45,20 @@ def _output_direction(links: LinkMotion, output: tuple[str, Pair], driving: str)
     assert place is not None
     end, fixed = (links.place(name, links.shapes[name].position(point)) for name, point in (place, pin))
     return end - fixed
+
+
+def can_drive(mechanism: Mechanism, pair: Pair, output: tuple[str, Pair]) -> bool:
+    """Whether a pair may pass a force from another moving link to the output, (link, pair)."""
+    link, output_pair = output
+    others = [body for body in pair.bodies if body not in (link, mechanism.frame)]
+    return link in pair.bodies and bool(others) and pair.entry_name() != output_pair.entry_name()
+
+
+def undriven_output(link: str) -> BadInput:
+    """The error for an output link that no other moving link drives."""
+    return BadInput(
+        link, f"no other moving link drives {link}: its transmission angle is that of a link the rest drives"
+    )
 
 
 def force_point(pair: Pair, link: str) -> tuple[str, str] | None:

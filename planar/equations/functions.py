@@ -190,20 +190,6 @@ class EquationFunctions:
         """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""
         return self.formulas.rounding_terms(y, y1, y2, p)
 
-    def deflated_system(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
-        """F and its first time derivative (2 rows,), and their Jacobian in z and z1 (2 rows, 2 unknowns).
-
-        A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
-        359, 2006.
-        """
-        rates = np.concatenate([z1, u1])
-        residuals, jacobian = self.residuals_and_jacobian(z, u, p)
-        slopes = np.asarray(jacobian)
-        changes = self.jacobian_changes(np.concatenate([z, u]), rates[None], p)[0]
-        by_z, change = slopes[:, : self._unknown_count], changes[:, : self._unknown_count]
-        system = np.block([[by_z, 0.0 * by_z], [change, by_z]])
-        return np.concatenate([residuals, slopes @ rates]), system
-
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         samples = np.atleast_2d(y)

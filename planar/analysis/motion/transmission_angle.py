@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -12,15 +12,16 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
+from planar.derivatives.transmission_system import can_drive, force_point, undriven_output
 from planar.document.first_argument import takes_result
 from planar.equations.coordinates import FRAME_PARTS
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Scalar, value_and_rates
 from planar.foundation.short_repr import short_repr
 from planar.model.output_pair import find_output_pair
-from planar.model.pairs import MeasureKind, Pair
+from planar.model.pairs import MeasureKind
 from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
@@ -137,13 +138,8 @@ class _DrivenOutput:
         self.rows_of_pair: dict[str, list[int]] = defaultdict(list)
         for number, row in enumerate(rows):
             self.rows_of_pair[row.name].append(number)
-        self.driving_pairs = {pair.name: pair for pair in rows if self._can_drive(pair)}
+        self.driving_pairs = {pair.name: pair for pair in rows if can_drive(mechanism, pair, (self.link, self.pair))}
         self.direction = self._slide_direction(moving) if self.slides else np.zeros(2)
-
-    def _can_drive(self, pair: Pair) -> bool:
-        """Whether a pair may pass a force from another moving link."""
-        others = [body for body in pair.bodies if body not in (self.link, self.prepared.mechanism.frame)]
-        return self.link in pair.bodies and bool(others) and pair.entry_name() != self.pair.entry_name()
 
     def angles(self, moving: KinematicResult, through: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Array]:
         """The pairs that drive the output, if they are not told, and the angle (n,); 0 at a limit."""
@@ -162,28 +158,27 @@ class _DrivenOutput:
         The greatest of a position is 1, as only directions are asked for. NaN where they are not determined because
         the position is a limit; second which positions (n,) are limits at which no forces balance the load.
         """
-        w = self._coordinates(moving)
+        w = np.atleast_2d(self.prepared.coordinates(moving.frames, moving.own))
         load = np.zeros(len(self.prepared.column))
         load[self.columns] = (*self.direction, 0.0) if self.slides else (0.0, 0.0, 1.0)
-        found: list[Array] = []
-        stuck = np.zeros(w.shape[1], dtype=bool)
-        for start in range(0, w.shape[1], CHUNK_SIZE):
+        wrenches: list[Array] = []
+        stuck = np.zeros(len(w), dtype=bool)
+        for start in range(0, len(w), CHUNK_SIZE):
             chunk = slice(start, start + CHUNK_SIZE)
-            sides = self.constraints.transposed_jacobians(w.T[chunk], self.inputs)
+            sides = self.constraints.transposed_jacobians(w[chunk], self.inputs)
             multipliers, stuck[chunk] = self._multipliers(sides, load)
             rows_of_pairs = [self.rows_of_pair[name] for name in self.driving_pairs]
             parts = [
                 np.einsum("ncr,nr->cn", _block(sides, self.columns, rows), multipliers[:, rows])
                 for rows in rows_of_pairs
             ]
-            found.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(sides)))
-        every = np.concatenate(found, axis=2)
-        greatest = np.abs(every).max(axis=(0, 1), initial=0.0)
+            wrenches.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(sides)))
+        all_wrenches = np.concatenate(wrenches, axis=2)
+        greatest = np.abs(all_wrenches).max(axis=(0, 1), initial=0.0)
         if not (greatest > NEGLIGIBLE_FORCE).any() and not stuck.all():
-            told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
-            raise BadInput(self.link, told)
+            raise undriven_output(self.link)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return dict(zip(self.driving_pairs, every / greatest, strict=True)), stuck
+            return dict(zip(self.driving_pairs, all_wrenches / greatest, strict=True)), stuck
 
     def _multipliers(self, sides: Array | SparseMatrices, load: Array) -> tuple[Array, BoolArray]:
         """Multipliers (n, rows) that balance a load (coordinates,) on slopes, transposed (n, coordinates, rows); which
@@ -234,53 +229,37 @@ class _DrivenOutput:
 
     def _lever(self, moving: KinematicResult, names: tuple[str, ...], force: Array) -> Array:
         """From the fixed pin to the point at which the force acts, (2, n). Raises BadInput where there is none."""
-        places = {self._force_point(self.driving_pairs[name]) for name in names}
+        places = {force_point(self.driving_pairs[name], self.link) for name in names}
         place = places.pop()
         if places or place is None:
-            told = (
+            reason = (
                 f"{self.link} is driven at {join_all_names(names)}, not at one pin"
                 if places
                 else f"wheels drive {self.link}"
             )
-            raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
-        at, pin = _point_positions(moving, *place), _point_positions(moving, *self._fixed_pin())
-        frame = moving.frames[self.link]
-        arm = at - np.array([np.atleast_1d(_value(frame.x)), np.atleast_1d(_value(frame.y))])
+            raise BadInput(self.link, f"{reason}, so that no one line of force with one pin tells a transmission angle")
+        fixed_pin = next(member for member in self.pair.coincident_points() if member[0] == moving.mechanism.frame)
+        members = (place, fixed_pin)
+        vectors = [moving.frames[link].to_world(moving.shapes[link].position(name)) for link, name in members]
+        point, pin = map(_values, vectors)
+        arm = point - _values((moving.frames[self.link].x, moving.frames[self.link].y))
         couple = np.abs(force[2] - (arm[0] * force[1] - arm[1] * force[0]) / self.prepared.unit)
         if np.max(couple[~np.isnan(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
-            told = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
-            raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
-        lever = at - pin
+            reason = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
+            raise BadInput(self.link, f"{reason}, so that no line of force through one pin tells a transmission angle")
+        lever: Array = point - pin
         if np.hypot(*lever).max() <= NEGLIGIBLE_FORCE * self.prepared.unit:
             raise BadInput(self.link, f"{self.link} is driven at its fixed pin, about which no force turns it")
         return lever
 
-    def _force_point(self, pair: Pair) -> tuple[str, str] | None:
-        """The (link, point) where a pair's force acts: of the output if it can be."""
-        at = [member for member in pair.coincident_points() if member[0] == self.link]
-        rides = pair.point_on_line()
-        return at[0] if at else rides and rides[0]
-
-    def _fixed_pin(self) -> tuple[str, str]:
-        return next(member for member in self.pair.coincident_points() if member[0] == self.prepared.mechanism.frame)
-
     def _slide_direction(self, moving: KinematicResult) -> Array:
         """The unit direction (2,) in which the output slides on the frame: how its place goes with the displacement."""
-        sides = self.constraints.transposed_jacobians(self._coordinates(moving).T[:1], self.inputs)
-        own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
-        way = _block(sides, slice(own, own + 1), self.rows_of_pair[self.pair.name][:2])[0, 0]
-        found: Array = way / np.hypot(*way)
-        return found
-
-    def _coordinates(self, moving: KinematicResult) -> Array:
-        """w (coordinates, n), lengths in sizes."""
-        parts = {(link, of): getattr(frame, of) for link, frame in moving.frames.items() for of in ("x", "y", "angle")}
-        for name, own in moving.own.items():
-            parts |= {
-                (name, of): each for (of, _), each in zip(self.prepared.pairs[name].coordinate_kinds, own, strict=True)
-            }
-        values = [_value(parts[each.owner, each.part]) for each in self.constraints.coordinates]
-        return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.prepared.scale[:, None]
+        w = np.atleast_2d(self.prepared.coordinates(moving.frames, moving.own))
+        sides = self.constraints.transposed_jacobians(w[:1], self.inputs)
+        column = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
+        direction = _block(sides, slice(column, column + 1), self.rows_of_pair[self.pair.name][:2])[0, 0]
+        unit_direction: Array = direction / np.hypot(*direction)
+        return unit_direction
 
 
 def _block(matrices: Array | SparseMatrices, rows: slice, columns: Sequence[int]) -> Array:
@@ -288,12 +267,6 @@ def _block(matrices: Array | SparseMatrices, rows: slice, columns: Sequence[int]
     return np.concatenate([matrices[:, rows, column : column + 1] for column in columns], axis=2)
 
 
-def _value(value: object) -> Array:
-    """The value of a jet, or of a plain number."""
-    return np.asarray(value.parts[0] if isinstance(value, Jet) else value, dtype=float)
-
-
-def _point_positions(moving: KinematicResult, link: str, point: str) -> Array:
-    """Where a point of a link is (2, n)."""
-    place = moving.frames[link].to_world(moving.shapes[link].position(point))
-    return np.stack(np.broadcast_arrays(*(np.atleast_1d(_value(each)) for each in place)))
+def _values(vector: Iterable[Scalar]) -> Array:
+    """The values of two components, jets or numbers, (2, n)."""
+    return np.stack(np.broadcast_arrays(*(np.atleast_1d(value_and_rates(component)[0]) for component in vector)))

@@ -160,12 +160,15 @@ def track_paths(
 
     `near` is how far a prediction may be off, `correction` what Newton's second step may still move a solution by.
     """
+    if not len(V):
+        return refine_ends(homotopy, V, np.zeros(0, dtype=bool))
     V = normalize(V)
     way, step = np.zeros(len(V), V.real.dtype), np.full(len(V), FIRST_STEP, V.real.dtype)
     least_step = MIN_STEP * min(1.0, float(np.finfo(V.real.dtype).eps / np.finfo(float).eps))
     busy = np.arange(len(V))
     current = _at_paths(homotopy, busy)
-    history = _History(V, _tangent(current, V, way) if len(V) else V)
+    _, jacobian, along = current(V, way)
+    history = _History(V, _solve_in_patch(jacobian, V, -along)[1][0])
     for _ in range(most_steps):
         if busy.size == 0:
             break
@@ -265,70 +268,54 @@ def _step_factors(first: Array, second: Array, good: BoolArray, points: IntArray
 
 def refine_ends(homotopy: Homotopy, V: ComplexArray, arrived: BoolArray) -> PathEnds:
     """Solutions carried to round-off at the end of the way."""
-    arrived = arrived.copy()
     if not len(V):
         return PathEnds(V, np.zeros(0), arrived, arrived)
     one = np.ones(len(V))
     for _ in range(3):
         with np.errstate(all="ignore"):
-            step, slope = _newton_step(homotopy, V, V, one)
-            moved = np.linalg.norm(step, axis=1)
-            good = moved < 1e-3
-        V = np.where(good[:, None], normalize(V + step), V)
-    values = np.linalg.svd(slope, compute_uv=False)
-    regular = values[:, -1] / values[:, 0]
-    arrived |= good & (moved < CORRECTION_TOLERANCE) & (regular > SINGULAR_TOLERANCE)
-    return PathEnds(V, regular, arrived, arrived.copy())
+            residuals, jacobian, _ = homotopy(V, one)
+            bordered, (step,) = _solve_in_patch(jacobian, V, -residuals)
+            distance = np.linalg.norm(step, axis=1)
+            is_near = distance < 1e-3
+        V = np.where(is_near[:, None], normalize(V + step), V)
+    singular_values = np.linalg.svd(bordered, compute_uv=False)
+    regularity = singular_values[:, -1] / singular_values[:, 0]
+    arrived = arrived | (is_near & (distance < CORRECTION_TOLERANCE) & (regularity > SINGULAR_TOLERANCE))
+    return PathEnds(V, regularity, arrived, arrived.copy())
 
 
 def _predict_and_correct(
-    at: Homotopy, history: _History, h: Array, ahead: Array
+    homotopy: Homotopy, history: _History, h: Array, ahead: Array
 ) -> tuple[ComplexArray, ComplexArray, Array, Array]:
     """Solutions a step on, their tangents, and how far Newton's two corrections moved them."""
-    tried = history.predict(h)
-    moved, _ = _newton_step(at, history.V, tried, ahead)
-    tried = tried + moved
-    left, slope, along = at(tried, ahead)
-    both = _solve_batch(_with_patch_rows(slope, history.V), _with_no_patch_rows(np.stack([-left, -along], axis=2)))
-    first, second = (np.linalg.norm(each, axis=1) for each in (moved, both[..., 0]))
-    first, second = (np.where(np.isfinite(each), each, np.inf) for each in (first, second))
-    return tried + both[..., 0], both[..., 1], first, second
+    V = history.predict(h)
+    residuals, jacobian, _ = homotopy(V, ahead)
+    _, (first,) = _solve_in_patch(jacobian, history.V, -residuals)
+    V = V + first
+    residuals, jacobian, along = homotopy(V, ahead)
+    _, (second, tangent) = _solve_in_patch(jacobian, history.V, -residuals, -along)
+    distances = (np.linalg.norm(step, axis=1) for step in (first, second))
+    return V + second, tangent, *(np.where(np.isfinite(distance), distance, np.inf) for distance in distances)
 
 
-def _with_patch_rows(slope: ComplexArray, patch: ComplexArray) -> ComplexArray:
-    """The slope with the two rows that keep X and Y from growing."""
-    half = patch.shape[1] // 2
-    rows = np.zeros((len(patch), 2, 2 * half), dtype=complex)
-    rows[:, 0, :half], rows[:, 1, half:] = patch[:, :half].conj(), patch[:, half:].conj()
-    return np.concatenate([slope, rows], axis=1)
-
-
-def _with_no_patch_rows(right: ComplexArray) -> ComplexArray:
-    """Right sides (paths, rows, sides) with nothing for these two rows."""
-    found = np.zeros((len(right), right.shape[1] + 2, right.shape[2]), dtype=complex)
-    found[:, :-2] = right
-    return found
-
-
-def _tangent(at: Homotopy, V: ComplexArray, way: Array) -> ComplexArray:
-    _, slope, along = at(V, way)
-    return _solve_batch(_with_patch_rows(slope, V), _with_no_patch_rows(-along[..., None]))[..., 0]
-
-
-def _newton_step(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> tuple[ComplexArray, ComplexArray]:
-    left, slope, _ = at(V, way)
-    slope = _with_patch_rows(slope, patch)
-    return _solve_batch(slope, _with_no_patch_rows(-left[..., None]))[..., 0], slope
-
-
-def _solve_batch(slope: ComplexArray, right: ComplexArray) -> ComplexArray:
-    """Solutions (paths, unknowns, sides) for right sides (paths, rows, sides)."""
+def _solve_in_patch(
+    jacobian: ComplexArray, patch: ComplexArray, *right_sides: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """The Jacobian with the two rows that keep X and Y from growing, and the solutions (sides, paths, unknowns) in the
+    patch for right sides (paths, rows)."""
+    paths, rows, half = len(patch), jacobian.shape[1], patch.shape[1] // 2
+    border = np.zeros((paths, 2, 2 * half), dtype=complex)
+    border[:, 0, :half], border[:, 1, half:] = patch[:, :half].conj(), patch[:, half:].conj()
+    bordered = np.concatenate([jacobian, border], axis=1)
+    right: ComplexArray = np.zeros((paths, rows + 2, len(right_sides)), dtype=complex)
+    right[:, :rows] = np.stack(right_sides, axis=2)
     try:
-        return np.linalg.solve(slope, right)
+        solutions: ComplexArray = np.linalg.solve(bordered, right)
     except np.linalg.LinAlgError:
-        bad = np.logical_not(np.isfinite(slope).all(axis=(1, 2)))
-        slope = np.where(bad[:, None, None], np.eye(slope.shape[1]), slope)
-        return np.linalg.pinv(slope) @ np.where(bad[:, None, None], np.nan, right)
+        is_lost = ~np.isfinite(bordered).all(axis=(1, 2))[:, None, None]
+        finite: ComplexArray = np.where(is_lost, np.eye(rows + 2), bordered)
+        solutions = np.linalg.pinv(finite) @ np.where(is_lost, np.nan, right)
+    return bordered, solutions.transpose(2, 0, 1)
 
 
 def normalize(V: ComplexArray) -> ComplexArray:

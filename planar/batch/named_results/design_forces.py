@@ -11,7 +11,7 @@ import numpy as np
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
-from planar.derivatives.transmission_system import force_point, loaded_output, output_angle
+from planar.derivatives.transmission_system import can_drive, force_point, loaded_output, output_angle, undriven_output
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.frictional_forces import solve_with_friction
 from planar.dynamics.load_variation import load_factors
@@ -155,22 +155,16 @@ class OutputLink:
         self.link, self.pair = find_output_pair(mechanism, output)
         self.mechanism = loaded_output(mechanism, self.pair)
         self.slides = self.pair.input_kind is MeasureKind.LENGTH
-        self.driving_pairs = {pair.name: pair for pair in mechanism.pairs if self._can_drive(pair)}
+        driven = self.link, self.pair
+        self.driving_pairs = {pair.name: pair for pair in mechanism.pairs if can_drive(mechanism, pair, driven)}
         if not self.driving_pairs:
-            raise self._undriven()
+            raise undriven_output(self.link)
         motions = relative_motions(mechanism)
-        driving_inputs = [driven.pair for driven in mechanism.inputs if self._can_drive(motions[driven.pair])]
+        inputs = [motions[drive.pair] for drive in mechanism.inputs]
+        driving_inputs = [pair.name for pair in inputs if can_drive(mechanism, pair, driven)]
         if driving_inputs:
-            told = f"the input at {driving_inputs[0]} itself drives {self.link} from another moving link"
-            raise BadInput(self.link, f"{told}; planar.transmission tells whether it has a transmission angle")
-
-    def _undriven(self) -> BadInput:
-        told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
-        return BadInput(self.link, told)
-
-    def _can_drive(self, pair: Pair) -> bool:
-        others = [body for body in pair.bodies if body not in (self.link, self.mechanism.frame)]
-        return self.link in pair.bodies and bool(others) and pair.entry_name() != self.pair.entry_name()
+            reason = f"the input at {driving_inputs[0]} itself drives {self.link} from another moving link"
+            raise BadInput(self.link, f"{reason}; planar.transmission tells whether it has a transmission angle")
 
     def angles(self, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray) -> Array:
         """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
@@ -195,7 +189,7 @@ class OutputLink:
             if np.any(size[solution.is_balanced] > NEGLIGIBLE_FORCE * unit):
                 names.append(name)
         if not names and solution.is_balanced.any():
-            raise self._undriven()
+            raise undriven_output(self.link)
         names = names or [*wrenches]
         force, moment = (np.sum([wrenches[name][k] for name in names], axis=0) for k in range(2))
         changes = [solution.wrench_changes[name][self.link].force for name in names]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from math import cos
-from typing import NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, Protocol, TypeAlias, cast
 
 import numpy as np
 
@@ -63,6 +63,8 @@ STANDING_INPUT = 1e-12
 """rad or sizes: inputs that move less than this stand still."""
 END_TOLERANCE = 1e-9
 """rad or sizes: so near to the end of a path a dead point, a change point or the end of a piece is at that end."""
+Lengths: TypeAlias = Any
+"""A length, or lengths of points or steps side by side."""
 
 
 class PassedBifurcation(NamedTuple):
@@ -106,22 +108,35 @@ class ArcBudget:
         return self.arcs_left >= 0 and not time_is_over()
 
 
+def first_step(longest: Lengths, regular_distance: Lengths, curvature: Lengths) -> Lengths:
+    """The step to try first from a point whose second derivative has this length, or from points (points,)."""
+    by_turn = FIRST_TURN_RATIO * MAX_TANGENT_TURN / np.maximum(curvature, 1e-300)
+    return np.minimum(np.minimum(longest, FIRST_DISTANCE_RATIO * regular_distance), by_turn)
+
+
+def is_step_sound(step: Lengths, distance: Lengths, tangent_cosine: Lengths, regular_distances: Lengths) -> Any:
+    """Whether a step that led so far, or steps (steps,), neither turned the tangent nor could pass a singular position.
+
+    `regular_distances` are the sums of those at both ends.
+    """
+    is_regular = SINGULAR_DISTANCE_RATIO * distance < regular_distances
+    return (tangent_cosine > MIN_TANGENT_COSINE) & is_regular & (distance < MAX_CORRECTED_RATIO * step)
+
+
 def next_point(curve: ImplicitCurve, point: CurvePoint, longest: float) -> tuple[CurvePoint | None, float]:
     """The next point of a curve, and the step to it, no longer than `longest`; None where no step leads on.
 
     A predictor of second order, Newton's corrector; a step that turns the tangent, or that could pass a singular
     position, is halved.
     """
-    bent = max(length_of(point.curvature), 1e-300)
-    step = min(longest, FIRST_DISTANCE_RATIO * point.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
+    step = float(first_step(longest, point.regular_distance, length_of(point.curvature)))
     while step > SHORTEST_STEP:
         y = curve.correct(point.ahead(step), point.tangent)
         if y is not None:
             after = curve.point_at(y, point.tangent)
             distance = length_of(y - point.y)
-            onwards = after.tangent @ point.tangent > MIN_TANGENT_COSINE
-            is_regular = SINGULAR_DISTANCE_RATIO * distance < point.regular_distance + after.regular_distance
-            if onwards and is_regular and distance < MAX_CORRECTED_RATIO * step:
+            regular_distances = point.regular_distance + after.regular_distance
+            if is_step_sound(step, distance, after.tangent @ point.tangent, regular_distances):
                 return after, step
         step *= 0.5
     return None, step

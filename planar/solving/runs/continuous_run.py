@@ -8,8 +8,9 @@ import numpy as np
 
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer
-from planar.foundation.jets import value_and_rates
+from planar.foundation.jets import Jet, value_and_rates
 from planar.model.mechanism import Input
+from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion
 from planar.results.records import Limit
 from planar.solving.continuation.path import follow_samples
@@ -36,7 +37,6 @@ class ContinuousRun:
         self.name = motion.running_input
         self.known = solved_mechanism(motion.mechanism)
         self.solver = self.known.solver
-        self.scale = _input_scale(self.solver)
         position = motion.inputs[self.name].position
         steps = np.diff(position)
         self.rows: Array = (
@@ -69,7 +69,7 @@ class ContinuousRun:
 
     def positions(self, places: Array) -> Array:
         """The position of the running input at places (n,), rad or m."""
-        return self._input_rates(np.asarray(places)).u[:, self._running] * self.scale[self._running]
+        return self._input_rates(np.asarray(places)).u[:, self._running] * self.solver.input_scale[self._running]
 
     def motion_at(self, places: Array) -> Motion:
         """The motion at places (n,), in their order. Raises NoAnswer where the branch cannot be followed."""
@@ -197,7 +197,7 @@ class ContinuousRun:
         u1, u2 = (
             np.array([getattr(driven, rate)[along] for driven in inputs]) for rate in ("velocity", "acceleration")
         )
-        return InputRates(*(part.T / self.scale for part in (u, u1, u2, np.zeros_like(u1))))
+        return InputRates(*(part.T / self.solver.input_scale for part in (u, u1, u2, np.zeros_like(u1))))
 
     def _divided(self, targets: Array) -> list[Array]:
         """Sorted places, divided where the path does not go on smoothly, and where no others are near."""
@@ -224,7 +224,7 @@ class ContinuousRun:
 def timed_inputs(solver: PositionSolver, time: Array) -> InputRates:
     """The inputs at times (s), each by its law, or at the file's velocity and acceleration."""
     parts = np.array([input_law_rates(driven, time) for driven in solver.mechanism.inputs])
-    return InputRates(*(part.T / _input_scale(solver) for part in parts.transpose(1, 0, 2)))
+    return InputRates(*(part.T / solver.input_scale for part in parts.transpose(1, 0, 2)))
 
 
 def input_law_rates(driven: Input, time: Array) -> Array:
@@ -236,11 +236,6 @@ def input_law_rates(driven: Input, time: Array) -> Array:
     return np.array([position, velocity, np.full_like(time, driven.acceleration), np.zeros_like(time)])
 
 
-def _input_scale(solver: PositionSolver) -> Array:
-    """What the inputs of the solver are in units of (inputs,): m or rad."""
-    return np.where(solver.structure.input_slides, solver.unit, 1.0)
-
-
 def _repeated(level: float, period: float, low: float, high: float) -> list[float]:
     """A level between two values, and all that are whole periods away."""
     if not period:
@@ -249,11 +244,15 @@ def _repeated(level: float, period: float, low: float, high: float) -> list[floa
     return [level + period * k for k in np.arange(first, last + 1.0).tolist()]
 
 
+def moving_jets(moving: KinematicResult) -> list[Jet]:
+    """x, y and angle of all moving links, then the coordinates of pairs."""
+    jets = [jet for f in moving.frames.values() if not f.fixed for jet in (f.x, f.y, f.angle)]
+    return jets + [jet for coordinates in moving.own.values() for jet in coordinates]
+
+
 def rows_with_rates(motion: Motion) -> BoolArray:
     """Which rows have velocities and accelerations (n,)."""
-    jets = [jet for f in motion.frames.values() if not f.fixed for jet in (f.x, f.y, f.angle)]
-    jets += [jet for coordinates in motion.own.values() for jet in coordinates]
-    parts = [np.broadcast_to(part, len(motion)) for jet in jets for part in jet.parts]
+    parts = [np.broadcast_to(part, len(motion)) for jet in moving_jets(motion) for part in jet.parts]
     if not parts:
         return np.ones(len(motion), dtype=bool)
     is_known: BoolArray = np.asarray(np.isfinite(parts).all(axis=0), dtype=bool)
@@ -262,14 +261,5 @@ def rows_with_rates(motion: Motion) -> BoolArray:
 
 def run_unknowns(solver: PositionSolver, motion: Motion) -> Array:
     """The unknowns at every row of a motion (rows, unknowns), from its frames."""
-    count = len(motion)
-    values: dict[tuple[str, str], Array] = {}
-    for link, frame in motion.frames.items():
-        if not frame.fixed:
-            values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
-    for name, jets in motion.own.items():
-        kinds = solver.pairs[name].coordinate_kinds
-        values |= {(name, part): jet.parts[0] for (part, _), jet in zip(kinds, jets, strict=True)}
-    coordinates = solver.equations.coordinates
-    w = np.array([np.broadcast_to(values[c.owner, c.part], count) for c in coordinates]).reshape(-1, count)
-    return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T
+    w = solver.coordinates(motion.frames, motion.own)
+    return np.broadcast_to(w, (len(motion), w.shape[-1]))[:, list(solver.equations.unknowns)]

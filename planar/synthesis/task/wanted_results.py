@@ -2,60 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 
 import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.kinematic_slopes import NamedResult
+from planar.derivatives.kinematic_slopes import NamedResult, RatedMotion
 from planar.derivatives.result_slopes import DerivedResults, PositionSlopes, SlopeSystem, tied_dimensions
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.foundation.geometry import Frame
 from planar.foundation.jets import TURN, Scalar
-from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.results.motion import Motion
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
 
 
-def wanted_parts(
-    mechanism: Mechanism,
-    frames: Mapping[str, Frame],
-    shapes: Mapping[str, LinkShape],
-    position_of: Callable[[str], Scalar],
-    wanted: Wanted,
-) -> list[Scalar]:
+def wanted_parts(mechanism: Mechanism, motion: RatedMotion, wanted: Wanted) -> list[Scalar]:
     """The parts of a wanted item, SI, in any arithmetic: of a point x and y, of a link those of its origin and its
-    angle, of a pair its position, which `position_of` gives by its name."""
+    angle, of a pair its position."""
     if isinstance(wanted, WantedPath):
         name = carried_name(mechanism, wanted.point)
         point = next((point for point in named_points(mechanism) if point.name == name), None)
         if point is None:
             raise BadInput("$.wanted", f"{mechanism.name!r} has no point {wanted.point!r}")
         link, place = point.members[0]
-        return list(frames[link].to_world(shapes[link].position(place)))
+        return list(motion.frames[link].to_world(motion.shapes[link].position(place)))
     if isinstance(wanted, WantedPoses):
-        if wanted.link not in frames:
+        if wanted.link not in motion.frames:
             raise BadInput("$.wanted", f"{mechanism.name!r} has no link {wanted.link!r}")
-        frame = frames[wanted.link]
+        frame = motion.frames[wanted.link]
         return [frame.x, frame.y, frame.angle]
     if wanted.to_pair not in relative_motions(mechanism):
         raise BadInput("$.wanted", f"{mechanism.name!r} has no pair {wanted.to_pair!r}")
-    return [position_of(wanted.to_pair)]
+    return [motion.input_position(motion.relative_motions[wanted.to_pair]).parts[0]]
 
 
 def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
     """The parts (parts,) of a wanted item in the unknowns and numbers of a design."""
-
-    def position_of(name: str) -> ca.SX:
-        position: ca.SX = design.motion.input_position(design.work.relative_motions[name]).parts[0]
-        return position
-
-    parts = wanted_parts(design.mechanism, design.placed[0], design.work.shapes, position_of, wanted)
-    return stack_expressions(parts)
+    return stack_expressions(wanted_parts(design.mechanism, design.motion, wanted))
 
 
 def wanted_slopes(moving: Motion, wanted: Iterable[Wanted]) -> tuple[SlopeSystem, DerivedResults]:
@@ -65,16 +51,8 @@ def wanted_slopes(moving: Motion, wanted: Iterable[Wanted]) -> tuple[SlopeSystem
 
     def results(part: PositionSlopes) -> list[NamedResult]:
         motion = part.kinematics.motion
-
-        def position_of(name: str) -> Scalar:
-            return motion.input_position(motion.relative_motions[name]).parts[0]
-
         return [
-            NamedResult(
-                str(number),
-                "length",
-                tuple(wanted_parts(moving.mechanism, motion.frames, motion.shapes, position_of, item)),
-            )
+            NamedResult(str(number), "length", tuple(wanted_parts(moving.mechanism, motion, item)))
             for number, item in enumerate(wanted)
         ]
 
