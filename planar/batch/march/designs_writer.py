@@ -6,6 +6,7 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from math import cos, inf, nan
 from typing import NamedTuple
 
@@ -21,8 +22,11 @@ from planar.batch.march.kernel_writer import (
     OperandNames,
     result_pointers,
     store_results,
+    write_angle_sum,
     write_closes,
     write_keeps_apart,
+    write_normalised,
+    write_small_rotation,
     write_turns_little,
 )
 from planar.batch.march.prediction import (
@@ -34,7 +38,8 @@ from planar.batch.march.prediction import (
 )
 from planar.codegen.llvm_linear import LinearSystems
 from planar.codegen.tape import LinkDirection, write_turn_flags
-from planar.equations.linear import solve_by_determinants
+from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
 
 MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
@@ -156,7 +161,9 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        return DesignsKernelLayout(self.state, self.input_operands, rows, t.module_text(), t.lanes, self.start)
+        return DesignsKernelLayout(
+            self.state, self.equations.input_operands, rows, t.module_text(), t.lanes, self.start
+        )
 
     def _write_lanes_start(self) -> tuple[OperandNames, OperandNames]:
         """A block of designs begins: its numbers, and the inputs at the start."""
@@ -173,7 +180,7 @@ class _DesignsKernelWriter(KernelWriter):
         if self.rates:
             have |= {(f"u{1 + k // count}", k % count): self.load_entry("%rate", k) for k in range(2 * count)}
         t.mark_hoist_point()
-        at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.input_operands)}
+        at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.equations.input_operands)}
         state = {leaf: self.load_entry("%state", k) for k, leaf in enumerate(self.state)}
         if self.start.has_signs:
             have |= state
@@ -218,7 +225,7 @@ class _DesignsKernelWriter(KernelWriter):
                 continue
             have["u", k] = t.binary("add", at_start["u", k], by)
             if turns:
-                have["uc", k], have["us", k] = self.write_angle_sum(at_start["uc", k], at_start["us", k], cos, sin)
+                have["uc", k], have["us", k] = write_angle_sum(t, at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.regularity_slot)
         t.store("zeroinitializer", self.correction_slot)
         self.history_indices = [
@@ -232,7 +239,7 @@ class _DesignsKernelWriter(KernelWriter):
             self._write_other_assembly(part, have)
         near = self.write_closed_form(part, have, as_cosine=True)
         for k in part.unknowns:
-            if self.is_carried(("z", k)):
+            if ("z", k) in self.carried:
                 self._write_carried_angle(k, have)
         if self.request.counts_candidates:
             self.apart_here.append(self.write_apart_here(part, near, have))
@@ -287,7 +294,7 @@ class _DesignsKernelWriter(KernelWriter):
         """Move an angle's own value on to where its new cos and sin are."""
         t = self.ir
         c, s = (t.load(self.state_slots[leaf, k]) for leaf in ("zc", "zs"))
-        cos, sin = self.write_angle_sum(have["zc", k], have["zs", k], c, t.add_instruction(f"fneg {t.vector} {s}"))
+        cos, sin = write_angle_sum(t, have["zc", k], have["zs", k], c, t.add_instruction(f"fneg {t.vector} {s}"))
         half = t.call_per_lane("atan", t.binary("div", sin, t.binary("add", t.constant(1.0), cos)))
         have["z", k] = t.binary("add", t.load(self.state_slots["z", k]), t.binary("add", half, half))
         for leaf in ("zc", "zs", "z"):
@@ -308,7 +315,7 @@ class _DesignsKernelWriter(KernelWriter):
         }
         for k in part.unknowns:
             if self.equations.is_angle[k]:
-                ahead["zc", k], ahead["zs", k] = self.write_normalised(ahead["zc", k], ahead["zs", k])
+                ahead["zc", k], ahead["zs", k] = write_normalised(t, ahead["zc", k], ahead["zs", k])
         for leaf, slot in own.items():
             t.store(ahead[leaf], slot)
         count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
@@ -328,10 +335,10 @@ class _DesignsKernelWriter(KernelWriter):
             back = t.add_instruction(f"fneg {t.vector} {each}")
             if ("z", k) in now:
                 now["z", k] = t.binary("add", now["z", k], back)
-            if self.is_carried(("z", k)):
+            if ("z", k) in self.carried:
                 now["zc", k], now["zs", k] = t.call_per_lane("cos", now["z", k]), t.call_per_lane("sin", now["z", k])
             elif self.equations.is_angle[k]:
-                now["zc", k], now["zs", k] = self.write_small_rotation(now["zc", k], now["zs", k], back)
+                now["zc", k], now["zs", k] = write_small_rotation(t, now["zc", k], now["zs", k], back)
         for leaf, slot in own.items():
             t.store(now[leaf], slot)
         t.store(t.add_all([t.load(moved), *far]), moved)
@@ -350,29 +357,44 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(have[leaf], t.element_pointer(self.history_slots[leaf], here))
 
     def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
-        """See `KernelEquations.newton_step`."""
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
+        and the square of the shortest: where it vanishes, as with the arm of a slide on which a link turns, an unknown
+        is not determined, however far the others' columns are from each other."""
+        e, block = self.equations.equations, part.block
+        residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
+        squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
         if not part.is_large:
-            return self.write_values(self.equations.newton_step(part.block), names)
+            return self.write_values([*solve_with_volume(jacobian, residual), squared_arm], names)
         assert self.linear_systems is not None
-        residuals, columns, squared_arm = self.write_separately(self.newton_system(part), names)
-        least = self.linear_systems.factorise(columns, len(residuals))
-        return [*self.linear_systems.solve(residuals), least, self.ir.constant(1.0), *squared_arm]
+        residuals, columns, arms = self.write_separately([residual, ca.vec(jacobian), squared_arm], names)
+        volume = self.linear_systems.factorise(columns, len(residuals))
+        return [*self.linear_systems.solve(residuals), volume, self.ir.constant(1.0), *arms]
 
     def _write_rates(self, have: OperandNames) -> None:
-        """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers."""
-        t = self.ir
-        for part, system in zip(self.equations.blocks, self.rate_systems(), strict=False):
+        """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers.
+
+        They are minus the Jacobian's inverse times right sides in symbols for the rates that are known before: the
+        first ones of earlier blocks for the first, all the first ones and the second ones of earlier blocks for the
+        second.
+        """
+        if not (self.rates and self.solves_rates_apart):
+            return
+        t, e, s = self.ir, self.equations.equations, self.symbols
+        rates, y1, y2 = UnknownRates(e), ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])
+        right_sides = zip(rates.right_sides(y1), rates.right_sides(y1, y2), strict=True)
+        for part, (first, second) in zip(self.equations.blocks, right_sides, strict=True):
+            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
             if part.is_large:
                 assert self.linear_systems is not None
-                self.linear_systems.factorise(self.write_values([ca.vec(system.jacobian)], have), len(part.unknowns))
-            for name, right_side in (("z1", system.first), ("z2", system.second)):
+                self.linear_systems.factorise(self.write_values([ca.vec(jacobian)], have), len(part.unknowns))
+            for name, right_side in (("z1", first), ("z2", second)):
                 if part.is_large and self.linear_systems is not None:
-                    found = self.linear_systems.solve(self.write_values([right_side], have))
+                    solution = self.linear_systems.solve(self.write_values([right_side], have))
                 else:
-                    found = self.write_values([solve_by_determinants(system.jacobian, right_side)], have)
+                    solution = self.write_values([solve_by_determinants(jacobian, right_side)], have)
                 have |= {
                     (name, k): t.add_instruction(f"fneg {t.vector} {value}")
-                    for k, value in zip(part.unknowns, found, strict=True)
+                    for k, value in zip(part.unknowns, solution, strict=True)
                 }
 
     def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:

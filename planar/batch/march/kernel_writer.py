@@ -77,31 +77,28 @@ class KernelWriter(KernelInstructions):
 
     def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
         """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
-        written = self._write_instructions(self.list_values(outputs, self.ir.count), names)
-        check_length(self.ir.count)
-        return written
-
-    def write_separately(self, outputs: Sequence[ca.SX], have: Mapping[Operand, str]) -> list[list[str]]:
-        """The same, of each expression by itself."""
-        values = iter(self.write_values(outputs, have))
-        return [[next(values) for _ in range(each.numel())] for each in outputs]
-
-    def _write_instructions(self, wanted: Sequence[int], have: Mapping[Operand, str]) -> list[str]:
-        made, still = self.hoister.result, self.hoister.invariants
-        order = required_values(made, wanted)
-        names = {}
+        results = self.list_values(outputs, self.ir.count)
+        made, invariants = self.hoister.result, self.hoister.invariants
+        order = required_values(made, results)
+        written = {}
         for k in order:
             operand = made.instructions[k].key
             if operand is not None:
-                if operand not in have:
+                if operand not in names:
                     raise BareAngle(operand)
-                names[k] = have[operand]
-        ahead = [k for k in order if k in still and k not in self.hoisted_names]
+                written[k] = names[operand]
+        ahead = [k for k in order if k in invariants and k not in self.hoisted_names]
         with self.ir.hoisted():
-            self.ir.write_values(made, ahead, self.hoisted_names, names)
-        names |= {k: self.hoisted_names[k] for k in order if k in still}
-        self.ir.write_values(made, [k for k in order if k not in still], names, names)
-        return [names[k] for k in wanted]
+            self.ir.write_values(made, ahead, self.hoisted_names, written)
+        written |= {k: self.hoisted_names[k] for k in order if k in invariants}
+        self.ir.write_values(made, [k for k in order if k not in invariants], written, written)
+        check_length(self.ir.count)
+        return [written[k] for k in results]
+
+    def write_separately(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[list[str]]:
+        """The same, of each expression by itself."""
+        values = iter(self.write_values(outputs, names))
+        return [[next(values) for _ in range(output.numel())] for output in outputs]
 
     def write_closed_form(self, part: KernelBlock, names: OperandNames, as_cosine: bool = False) -> str:
         """A block in closed form: its unknowns put into `names`, and how near its two assemblies are, see
@@ -117,26 +114,9 @@ class KernelWriter(KernelInstructions):
 
     def write_stops(self, names: OperandNames) -> list[str]:
         """What reaches one where a pair meets its stop, of each pair with stops."""
-        return self.write_values(self.stop_outputs(), names) if self.equations.stop_pairs else []
-
-    def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
-        """The cos and sin of a sum of two angles."""
-        return write_angle_sum(self.ir, cos, sin, c, s)
-
-    def write_small_rotation(self, c: str, s: str, angle: str) -> tuple[str, str]:
-        """The cos and sin of an angle turned by a little."""
-        t = self.ir
-        square = t.binary("mul", angle, angle)
-        cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
-        sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
-        return self.write_normalised(*self.write_angle_sum(c, s, cos, sin))
-
-    def write_normalised(self, c: str, s: str) -> tuple[str, str]:
-        """What is nearly of length one, nearer to it: the inverse root by its first terms."""
-        t = self.ir
-        square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
-        return t.binary("mul", c, scale), t.binary("mul", s, scale)
+        if not self.equations.stop_pairs:
+            return []
+        return self.write_values([self.equations.stop_coalescences(self.symbols["stop"])], names)
 
     def write_apart_here(self, part: KernelBlock, near: str, names: OperandNames) -> str:
         """A flag: the two assemblies of a block are apart enough for a position, by its cosine or coalescence `near`,
@@ -180,6 +160,21 @@ def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[st
         t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
         t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
     )
+
+
+def write_normalised(t: IRWriter, c: str, s: str) -> tuple[str, str]:
+    """What is nearly of length one, nearer to it: the inverse root by its first terms."""
+    square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
+    scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
+    return t.binary("mul", c, scale), t.binary("mul", s, scale)
+
+
+def write_small_rotation(t: IRWriter, c: str, s: str, angle: str) -> tuple[str, str]:
+    """The cos and sin of an angle turned by a little."""
+    square = t.binary("mul", angle, angle)
+    cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
+    sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
+    return write_normalised(t, *write_angle_sum(t, c, s, cos, sin))
 
 
 def result_pointers(t: IRWriter, lane: str, many: int, is_single: bool) -> list[str]:
