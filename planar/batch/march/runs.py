@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.march.checks import DesignFunctions, PointWriter, design_positions
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import (
     CorrectedAssemblies,
     DesignBatch,
@@ -112,10 +112,10 @@ def run_designs(batch: DesignBatch, out: Array, candidates: Array | None = None)
 
 def _run_start(batch: DesignBatch, out: Array, candidates: Array | None) -> Array:
     """The first position alone, of designs of any structure."""
-    functions = DesignFunctions(batch.functions, batch.p)
+    evaluation = DesignEvaluation(batch)
     with np.errstate(all="ignore"):
-        row = design_positions(functions, batch, functions.correct(_columns(batch.z0), batch.u0.T), batch.u0)
-        good: Array = (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+        positions = evaluation.positions(evaluation.correct(_columns(batch.z0), batch.u0.T), batch.u0)
+        good: Array = (evaluation.write_points(out[0], positions) & evaluation.accepts(positions)).astype(int)
     erase_from_steps(out, good)
     if candidates is not None:
         candidates[:] = good
@@ -190,9 +190,8 @@ def last_good_unknowns(batch: DesignBatch, good: Array) -> Array:
     try:
         return unknowns_at_steps(batch, np.maximum(good - 1, 0))
     except UnsupportedOperation:  # none has gone beyond its start
-        functions = DesignFunctions(batch.functions, batch.p)
         with np.errstate(all="ignore"):
-            return functions.correct(_columns(batch.z0), batch.u0.T).T
+            return DesignEvaluation(batch).correct(_columns(batch.z0), batch.u0.T).T
 
 
 def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
