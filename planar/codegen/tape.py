@@ -121,13 +121,13 @@ class FormulaInput(NamedTuple):
 
 
 class BlockFormula:
-    """A list of instructions with the numbers of its outputs and inputs."""
+    """A list of instructions with the numbers of its outputs, of all values that they need in `order`, and of inputs."""
 
-    def __init__(
-        self, instructions: InstructionList[FormulaInput], outputs: tuple[int, ...], inputs: dict[int, FormulaInput]
-    ):
-        self.instructions, self.outputs, self.inputs = instructions, outputs, inputs
+    def __init__(self, instructions: InstructionList[FormulaInput], outputs: Sequence[int]):
+        self.instructions, self.outputs = instructions, outputs
         self.order = required_values(instructions, outputs)
+        keys = ((number, instructions.instructions[number].key) for number in self.order)
+        self.inputs = {number: key for number, key in keys if key is not None}
 
 
 class TapeFormula(NamedTuple):

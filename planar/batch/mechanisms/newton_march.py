@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from planar.batch.march.kernel_writer import write_normalised
 from planar.batch.march.prediction import correction_limit, extrapolation_weights
-from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType, rotate
 from planar.batch.mechanisms.tape_runs import LEAST_COSINE
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -195,21 +196,10 @@ class _NewtonBlockWriter:
         if not self.block_type.unknown_is_angle[k]:
             t.store(t.binary("add", t.load(first), by), first)
             return
-        half = t.binary("mul", by, t.constant(0.5))
-        square = t.binary("mul", half, half)
-        scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
-        cos = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale)
-        sin = t.binary("mul", by, scale)
-        c, s = t.load(first), t.load(second)
-        c, s = (
-            t.binary("sub", t.binary("mul", c, cos), t.binary("mul", s, sin)),
-            t.binary("add", t.binary("mul", s, cos), t.binary("mul", c, sin)),
-        )
+        rotated = rotate(t.binary, t.constant, t.load(first), t.load(second), by)
         # back onto the circle, which rounding leaves
-        size = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        scale_back = t.binary("sub", t.constant(1.5), t.binary("mul", t.constant(0.5), size))
-        t.store(t.binary("mul", c, scale_back), first)
-        t.store(t.binary("mul", s, scale_back), second)
+        for value, slot in zip(write_normalised(t, *rotated), (first, second), strict=True):
+            t.store(value, slot)
 
     def _write_formula(self, formula: BlockFormula, names: dict[FormulaInput, str]) -> list[str]:
         t = self.ir
