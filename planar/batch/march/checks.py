@@ -40,7 +40,7 @@ class DesignEvaluation:
 
     def correct(self, z: Array, u: Array) -> Array:
         """Newton's method from z (designs, unknowns) near by, at inputs u (designs, inputs)."""
-        return self.functions.correct_samples(z, u, self.p) if z.size else z
+        return self.functions.correct_samples(np.ascontiguousarray(z), u, self.p) if z.size else z
 
     def jacobians(self, z: Array, u: Array) -> tuple[Array, Array]:
         """dF/dz (designs, rows, unknowns) and dF/du (designs, rows, inputs), as `EquationFunctions.jacobians`."""

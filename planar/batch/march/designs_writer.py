@@ -37,7 +37,7 @@ from planar.batch.march.prediction import (
     least_regularity,
 )
 from planar.codegen.llvm_linear import LinearSystems
-from planar.codegen.tape import LinkDirection, write_turn_flags
+from planar.codegen.tape import LinkDirection, write_turn_check
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
@@ -262,13 +262,11 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_turns(self, have: OperandNames) -> list[str]:
         """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,
         steps do not show what these blocks do between them."""
-        t, flag = self.ir, "splat (i1 true)"
+        if not self.turn_slots:
+            return []
         directions = [LinkDirection(have["zc", k], have["zs", k], None) for k in self.turn_slots]
         slots = [slot for both in self.turn_slots.values() for slot in both]
-        flag = write_turn_flags(t, flag, directions, [t.load(slot) for slot in slots], cos(MAX_TURN_PER_STEP))
-        for slot, value in zip(slots, (part for direction in directions for part in direction[:2]), strict=True):
-            t.store(value, slot)
-        return [flag] if slots else []
+        return [write_turn_check(self.ir, "splat (i1 true)", directions, slots, cos(MAX_TURN_PER_STEP))]
 
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""

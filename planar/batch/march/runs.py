@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from math import ceil
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +30,8 @@ from planar.batch.march.prediction import (
     PREDICTOR_ORDER,
     correction_counts,
     correction_limit,
-    extrapolation_weights,
     longest_step,
+    prediction_weights,
 )
 from planar.codegen.llvm_compile import allocate_aligned, compile_function, is_aligned
 from planar.foundation.instruction_list import UnsupportedOperation
@@ -114,7 +114,7 @@ def _run_start(batch: DesignBatch, out: Array, candidates: Array | None) -> Arra
     """The first position alone, of designs of any structure."""
     evaluation = DesignEvaluation(batch)
     with np.errstate(all="ignore"):
-        positions = evaluation.positions(evaluation.correct(_columns(batch.z0), batch.u0.T), batch.u0)
+        positions = evaluation.positions(evaluation.correct(batch.z0.T, batch.u0.T), batch.u0)
         good: Array = (evaluation.write_points(out[0], positions) & evaluation.accepts(positions)).astype(int)
     erase_from_steps(out, good)
     if candidates is not None:
@@ -122,26 +122,16 @@ def _run_start(batch: DesignBatch, out: Array, candidates: Array | None) -> Arra
     return good
 
 
-def _columns(rows: Array) -> Array:
-    return np.ascontiguousarray(rows.T)
-
-
-class _Division(NamedTuple):
-    """Steps that are divided into so many parts each, and where the inputs are (parts + 1, inputs)."""
-
-    part_count: int
-    input_offsets: Array
-
-
-def _divide_steps(offsets: Array) -> _Division:
-    """Steps as they are, or divided where they do not show what lies between, by offsets (steps + 1, inputs)."""
+def _divide_steps(offsets: Array) -> tuple[int, Array]:
+    """Into how many parts steps are divided where they do not show what lies between, by offsets (steps + 1, inputs),
+    and the offsets of these (parts + 1, inputs)."""
     steps, longest = len(offsets), longest_step(offsets)
     count = ceil(longest / REFINED_STEP) if longest > LONGEST_STEP or steps == 2 else 1
     count = max(count, 2) if steps == 2 else count
     if count == 1:
-        return _Division(1, offsets)
+        return 1, offsets
     knots = np.arange(count * (steps - 1) + 1) / count
-    return _Division(count, np.array([np.interp(knots, np.arange(steps), each) for each in offsets.T]).T)
+    return count, np.array([np.interp(knots, np.arange(steps), column) for column in offsets.T]).T
 
 
 def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None, extra_corrections: int = 0) -> Array:
@@ -191,7 +181,7 @@ def last_good_unknowns(batch: DesignBatch, good: Array) -> Array:
         return unknowns_at_steps(batch, np.maximum(good - 1, 0))
     except UnsupportedOperation:  # none has gone beyond its start
         with np.errstate(all="ignore"):
-            return DesignEvaluation(batch).correct(_columns(batch.z0), batch.u0.T).T
+            return DesignEvaluation(batch).correct(batch.z0.T, batch.u0.T).T
 
 
 def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
@@ -340,10 +330,8 @@ def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
     steps, inputs = shape
     offsets = np.frombuffer(content).reshape(shape)
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
-    for step in range(min(steps, PREDICTOR_ORDER)):
-        # ahead of the first there is its start
-        table[step, : max(step, 1)] = extrapolation_weights(max(step, 1))
-    table[PREDICTOR_ORDER:, :PREDICTOR_ORDER] = extrapolation_weights(PREDICTOR_ORDER)
+    table[:, :PREDICTOR_ORDER] = prediction_weights(steps, PREDICTOR_ORDER, 1)
+    table[:1, 0] = 1.0  # ahead of the first step there is its start
     for k in range(inputs):
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1

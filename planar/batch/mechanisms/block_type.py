@@ -19,7 +19,7 @@ from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
-from planar.foundation.geometry import GROUND, Frame, frame_at
+from planar.foundation.geometry import GROUND, frame_at
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.link_shapes import Link
 from planar.model.mechanism import Input, Mechanism
@@ -154,7 +154,7 @@ class BlockType:
             sign_numbers = [work.instructions.add_constant(sign) for sign in signs]
             assembly = work.closed_form_assembly(sign_numbers)
             poses = work.poses(assembly)
-            residual, clear = work.acceptance_values(assembly, work.residuals(assembly, poses))
+            residual, clear = work.acceptance_values(assembly, poses)
             outputs = [*(number for pose in poses for number in pose), *sign_numbers, residual]
             modes.append(_StartMode(outputs, work.sketch_distance(poses, sums), residual, clear))
         *outputs, residual, nearest, second, least_clear = work.nearest_mode(modes)
@@ -174,8 +174,7 @@ class BlockType:
             signs = [work.add_input("p", self.number_count + k) for k in range(self.sign_count)]
             assembly = work.closed_form_assembly(signs, polished)
             poses = work.poses(assembly)
-            acceptance = work.acceptance_values(assembly, work.residuals(assembly, poses))
-            outputs = [*work.link_rows(assembly, poses, rates), *acceptance]
+            outputs = [*work.link_rows(assembly, poses, rates), *work.acceptance_values(assembly, poses)]
             self._run_formulas[rates, polished] = work.make_formula(outputs)
         return self._run_formulas[rates, polished]
 
@@ -276,6 +275,11 @@ class FormulaBuilder:
                 for k in range(e.u.numel())]  # fmt: skip
         self.u1 = [self.add_input("row", slot, first) for slot, first, _ in rows]
         self.u2 = [self.add_input("row", slot, second) for slot, _, second in rows]
+        pairs = {pair.name: pair for pair in block_type.mechanism.pairs}
+        self.inner_frames, self.pair_coordinates = frames_from_coordinates(
+            ca.vertsplit(e.w), coordinate_columns(e.coordinates), block_type.inner_links, pairs
+        )
+        "of the inner links, and of pairs by name, in the unknowns"
 
     def add_input(self, source: str, place: int, part: int = 0) -> int:
         """Add an input; "angle" and "unknown" are represented by their cos and sin."""
@@ -328,14 +332,22 @@ class FormulaBuilder:
             return self.make_formula(self._inline([step, strength], z))
         assembly = SymbolicAssembly(z, cos_sin, [])
         poses = self.poses(assembly)
-        residual, _ = self.acceptance_values(assembly, self.residuals(assembly, poses))
+        residual, _ = self.acceptance_values(assembly, poses)
         return self.make_formula([*self.link_rows(assembly, poses, rates), residual])
 
     def link_rows(self, assembly: SymbolicAssembly, poses: list[list[int]], rates: bool) -> list[int]:
-        """The rows of the inner links: their poses, each followed by its rates if they are wanted."""
-        if rates:
-            poses = [pose + rows for pose, rows in zip(poses, self.rates(assembly), strict=True)]
-        return [number for pose in poses for number in pose]
+        """The rows of the inner links: their poses, each followed by its rates if they are wanted: x', y', angle', then
+        the second ones."""
+        if not rates:
+            return [number for pose in poses for number in pose]
+        e, (u1, u2), count = self.equations, self.symbols[2:], 3 * len(poses)
+        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
+        w1, w2 = first_and_second_rates(e.w[:count], e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
+        values = self._inline([w1, w2], assembly.z)
+        rows: list[int] = []
+        for k, pose in enumerate(poses):
+            rows += [*pose, *values[3 * k : 3 * k + 3], *values[count + 3 * k : count + 3 * k + 3]]
+        return rows
 
     def _polish(self, stage: Block, z: list[int], parts: dict[int, list[int]]) -> dict[int, list[int]]:
         """The unknowns of a group after a step of Newton's method, angles rotated by the rational rotation."""
@@ -359,22 +371,13 @@ class FormulaBuilder:
             for (k, value), step in zip(parts.items(), steps, strict=True)
         }
 
-    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple[ca.SX, ...]]]:
-        """Frames of the inner links and coordinates of the pairs, in the unknowns."""
-        e, kind = self.equations, self.block_type
-        column = coordinate_columns(e.coordinates)
-        return frames_from_coordinates(
-            ca.vertsplit(e.w), column, kind.inner_links, {pair.name: pair for pair in kind.mechanism.pairs}
-        )
-
     def poses(self, assembly: SymbolicAssembly) -> list[list[int]]:
         """x, y, cos and sin of every inner link."""
-        frames, _ = self._inner_frames()
-        parts = [part for name in self.block_type.inner_links for part in frames[name][:4]]
-        values = self._inline([ca.SX(part) for part in parts], assembly.z)
-        return [values[4 * k : 4 * k + 4] for k in range(len(self.block_type.inner_links))]
+        parts = [ca.SX(part) for frame in self.inner_frames.values() for part in frame[:POSE_ROWS]]
+        values = self._inline(parts, assembly.z)
+        return [values[first : first + POSE_ROWS] for first in range(0, len(values), POSE_ROWS)]
 
-    def residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
+    def _residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
         """The residual of every constraint by the formulas of the pairs, independent of the elimination.
 
         Of an angle that closes modulo a turn |sin| + 1 - cos; of cos and sin of an unknown, how far from the circle.
@@ -389,8 +392,7 @@ class FormulaBuilder:
         split = [*ca.vertsplit(e.u)[:first_input], *ca.vertsplit(places)]
         names = (*kind.given_links, *kind.inner_links)
         frames = {name: frame_at(*split[3 * k : 3 * k + 3]) for k, name in enumerate(names)} | {"frame": GROUND}
-        _, coordinates = self._inner_frames()
-        errors = closing_errors(e, kind.mechanism, frames, coordinates, first_input)
+        errors = closing_errors(e, kind.mechanism, frames, self.pair_coordinates, first_input)
         values = self._inline([errors], assembly.z, [(places, place_numbers)])
         add = self.instructions.add
         for c, s in assembly.cos_sin.values():
@@ -398,11 +400,11 @@ class FormulaBuilder:
             values.append(add("sub", square, self.instructions.add_constant(1.0)))
         return values
 
-    def acceptance_values(self, assembly: SymbolicAssembly, residuals: list[int]) -> list[int]:
+    def acceptance_values(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
         """The largest residual, and the least distance measure from a dead point."""
         add = self.instructions.add
         largest = total = self.instructions.add_constant(0.0)
-        for residual in residuals:
+        for residual in self._residuals(assembly, poses):
             size = add("abs", residual)
             largest, total = add("maxnum", largest, size), add("add", total, size)
         # NaN stays in a sum, but not in the largest
@@ -412,15 +414,6 @@ class FormulaBuilder:
             distance = add("sub", self.instructions.add_constant(1.0), coalescence)
             clear = add("minnum", clear, distance) if k else distance
         return [largest, clear]
-
-    def rates(self, assembly: SymbolicAssembly) -> list[list[int]]:
-        """x', y', angle', then the second ones of every inner link."""
-        e, (u1, u2) = self.equations, self.symbols[2:]
-        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
-        count = 3 * len(self.block_type.inner_links)
-        w1, w2 = first_and_second_rates(e.w[:count], e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
-        values = self._inline([w1, w2], assembly.z)
-        return [values[3 * k : 3 * k + 3] + values[count + 3 * k : count + 3 * k + 3] for k in range(count // 3)]
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
         """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
