@@ -15,9 +15,6 @@ import casadi as ca
 from planar.batch.march.design_batch import ResultRows
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.kernel_writer import (
-    STATE_GIVEN,
-    DesignsKernelLayout,
-    KernelStart,
     KernelWriter,
     OperandNames,
     result_pointers,
@@ -61,7 +58,9 @@ class KernelRequest(NamedTuple):
     counts. With `point_blocks`, the block that places each point, a step has further rows: x and y of every point in
     the other assembly of its block (infinite where that is not known), the state, and the regularity of the least
     regular block that Newton's method solves. Rows bypass the caches where it `streams`; where it `is_single`, they are
-    rounded. `results` are written in place of the points.
+    rounded. `results` are written in place of the points. The function starts with `has_signs`, where all blocks are in
+    closed form, from the signs of their assemblies in place of the state; with `has_common_inputs` too, all designs
+    have the same inputs, which stand in the table.
     """
 
     equations: KernelEquations
@@ -69,11 +68,26 @@ class KernelRequest(NamedTuple):
     rates: bool
     lanes: int
     point_blocks: tuple[int, ...] | None = None
-    start: KernelStart = STATE_GIVEN
+    has_signs: bool = False
+    has_common_inputs: bool = False
     streams: bool = True
     is_single: bool = False
     counts_candidates: bool = False
     results: ResultRows | None = None
+
+
+class DesignsKernelLayout(NamedTuple):
+    """The function of a request, and the rows that it takes and writes, each with an entry for every design.
+
+    `state`: cos and sin of an angle, or a length, and an angle that is carried; `inputs`: the same of the inputs;
+    `output_row_count`: of the rows of a step.
+    """
+
+    request: KernelRequest
+    state: tuple[Operand, ...]
+    inputs: tuple[Operand, ...]
+    output_row_count: int
+    ir: str
 
 
 def write_designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
@@ -86,19 +100,19 @@ def write_designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
             if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
             carried |= {angle.operand}
-            request = request._replace(start=STATE_GIVEN)
+            request = request._replace(has_signs=False, has_common_inputs=False)
 
 
 class _DesignsKernelWriter(KernelWriter):
     def __init__(self, request: KernelRequest, carried: frozenset[Operand]):
         equations = request.equations
         super().__init__(equations, request.links, request.rates, request.lanes, INVARIANT_KINDS, carried)
-        self.request, self.start, self.results = request, request.start, request.results
+        self.request, self.results = request, request.results
         self.other_points: dict[int, list[str]] = {}
         self.apart_here: list[str] = []
         "flags of blocks in closed form whose assemblies are apart at a step"
         self.state = self.state_operands()
-        if self.start.has_signs:
+        if request.has_signs:
             self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
@@ -161,9 +175,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        return DesignsKernelLayout(
-            self.state, self.equations.input_operands, rows, t.module_text(), t.lanes, self.start
-        )
+        return DesignsKernelLayout(self.request, self.state, self.equations.input_operands, rows, t.module_text())
 
     def _write_lanes_start(self) -> tuple[OperandNames, OperandNames]:
         """A block of designs begins: its numbers, and the inputs at the start."""
@@ -182,7 +194,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.mark_hoist_point()
         at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.equations.input_operands)}
         state = {leaf: self.load_entry("%state", k) for k, leaf in enumerate(self.state)}
-        if self.start.has_signs:
+        if self.request.has_signs:
             have |= state
         elif self.equations.closed_forms:
             sides = self.write_values([self.equations.sides], have | at_start | state)
@@ -220,7 +232,7 @@ class _DesignsKernelWriter(KernelWriter):
         self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
         for k, turns in enumerate(self.equations.input_is_angle):
             by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
-            if self.start.has_common_inputs:
+            if self.request.has_common_inputs:
                 have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
                 continue
             have["u", k] = t.binary("add", at_start["u", k], by)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from math import sqrt
-from typing import NamedTuple
 
 import casadi as ca
 
@@ -20,32 +19,6 @@ OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""
 LEAST_CANDIDATE_REGULARITY = 1e-3
 """Of a position that may stand as it is once it is known that there is no dead point before it."""
-
-
-class KernelStart(NamedTuple):
-    """What of the start is told: the signs of the blocks' assemblies in place of the state, where all of them are in
-    closed form; with these, whether all designs have the same inputs, which then stand in the table."""
-
-    has_signs: bool = False
-    has_common_inputs: bool = False
-
-
-STATE_GIVEN = KernelStart()
-
-
-class DesignsKernelLayout(NamedTuple):
-    """What the function takes and gives, row by row, each with an entry for every design.
-
-    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
-    rows that a step gives; table: numbers that a step takes.
-    """
-
-    state: tuple[Operand, ...]
-    inputs: tuple[Operand, ...]
-    output_row_count: int
-    ir: str
-    lanes: int
-    start: KernelStart
 
 
 class KernelWriter(KernelInstructions):
