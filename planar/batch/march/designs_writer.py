@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
+from itertools import chain
 from math import cos, inf, nan
 from typing import NamedTuple
 
@@ -208,8 +209,8 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
         t.store_flags("splat (i1 true)", self.passed_slot)
         t.store_flags("splat (i1 true)", self.candidate_slot)
-        for each in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
-            t.store("zeroinitializer", each)
+        for slot in (self.good_count_slot, self.candidate_count_slot, *chain.from_iterable(self.bend_slots)):
+            t.store("zeroinitializer", slot)
         for slot in (slot for both in self.turn_slots.values() for slot in both):
             t.store(t.constant(nan), slot)
         t.write_line("br label %step")
@@ -266,10 +267,10 @@ class _DesignsKernelWriter(KernelWriter):
         By as much as it bends over the last three steps. So it may be the step before at which it had come too near.
         """
         t = self.ir
-        before, earlier = (t.load(slot) for slot in slots)
-        for slot, new in zip(slots, (value, before), strict=True):
+        previous, earlier = (t.load(slot) for slot in slots)
+        for slot, new in zip(slots, (value, previous), strict=True):
             t.store(new, slot)
-        return write_keeps_apart(t, earlier, before, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
+        return write_keeps_apart(t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
 
     def _write_turns(self, have: OperandNames) -> list[str]:
         """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,
@@ -291,13 +292,13 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
         assert self.request.point_blocks is not None
-        level, there = part.block.block_index, dict(have)
-        there["sign", self.sign_index[level]] = self.ir.add_instruction(
+        level, other = part.block.block_index, dict(have)
+        other["sign", self.sign_index[level]] = self.ir.add_instruction(
             f"fneg {self.ir.vector} {have['sign', self.sign_index[level]]}"
         )
-        self.write_closed_form(part, there)
-        points = [k for k, each in enumerate(self.request.point_blocks) if each == level]
-        places = self.write_values([self.point_coordinates(points)], there)
+        self.write_closed_form(part, other)
+        points = [k for k, block in enumerate(self.request.point_blocks) if block == level]
+        places = self.write_values([self.point_coordinates(points)], other)
         self.other_points |= {k: places[2 * n : 2 * n + 2] for n, k in enumerate(points)}
 
     def _write_carried_angle(self, k: int, have: OperandNames) -> None:
@@ -313,58 +314,56 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
         """Newton's method for a block from where it would be if it went on as before, so often as the step says."""
         t, level = self.ir, part.block.block_index
-        own = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
+        slots = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
         ahead = {
             leaf: t.add_all(
                 [
-                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], at)))
-                    for w, at in zip(self.predictor_weights, self.history_indices, strict=True)
+                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], index)))
+                    for w, index in zip(self.predictor_weights, self.history_indices, strict=True)
                 ]
             )
-            for leaf in own
+            for leaf in slots
         }
         for k in part.unknowns:
             if self.equations.is_angle[k]:
                 ahead["zc", k], ahead["zs", k] = write_normalised(t, ahead["zc", k], ahead["zs", k])
-        for leaf, slot in own.items():
+        for leaf, slot in slots.items():
             t.store(ahead[leaf], slot)
         count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
-        strong, before = t.load(self.regularity_slot), t.load(self.correction_slot)
-        moved = self.block_correction_slots[level]
-        t.store("zeroinitializer", moved)
+        regularity, correction = t.load(self.regularity_slot), t.load(self.correction_slot)
+        block_correction = self.block_correction_slots[level]
+        t.store("zeroinitializer", block_correction)
         t.write_line(f"br label %from{level}")
         t.write_label(f"from{level}")
         t.write_line(f"br label %newton{level}")
         t.write_label(f"newton{level}")
         t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
-        now = {leaf: t.load(slot) for leaf, slot in own.items()}
-        *delta, spanned, lengths, squared_arm = self._write_newton_step(part, have | now)
-        far = []
-        for k, each in zip(part.unknowns, delta, strict=True):
-            far.append(t.call_intrinsic("fabs", each))
-            back = t.add_instruction(f"fneg {t.vector} {each}")
-            if ("z", k) in now:
-                now["z", k] = t.binary("add", now["z", k], back)
+        unknowns = {leaf: t.load(slot) for leaf, slot in slots.items()}
+        *steps, volume, lengths, squared_arm = self._write_newton_step(part, have | unknowns)
+        magnitudes = []
+        for k, step in zip(part.unknowns, steps, strict=True):
+            magnitudes.append(t.call_intrinsic("fabs", step))
+            back = t.add_instruction(f"fneg {t.vector} {step}")
+            if ("z", k) in unknowns:
+                unknowns["z", k] = t.binary("add", unknowns["z", k], back)
             if ("z", k) in self.carried:
-                now["zc", k], now["zs", k] = t.call_per_lane("cos", now["z", k]), t.call_per_lane("sin", now["z", k])
+                angle = unknowns["z", k]
+                unknowns["zc", k], unknowns["zs", k] = t.call_per_lane("cos", angle), t.call_per_lane("sin", angle)
             elif self.equations.is_angle[k]:
-                now["zc", k], now["zs", k] = write_small_rotation(t, now["zc", k], now["zs", k], back)
-        for leaf, slot in own.items():
-            t.store(now[leaf], slot)
-        t.store(t.add_all([t.load(moved), *far]), moved)
+                c, s = unknowns["zc", k], unknowns["zs", k]
+                unknowns["zc", k], unknowns["zs", k] = write_small_rotation(t, c, s, back)
+        for leaf, slot in slots.items():
+            t.store(unknowns[leaf], slot)
+        t.store(t.add_all([t.load(block_correction), *magnitudes]), block_correction)
         t.close_loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
         t.write_label(f"solved{level}")
-        have.update({leaf: t.load(slot) for leaf, slot in own.items()})
-        t.store(
-            t.call_intrinsic(
-                "minnum", strong, self._write_regularity(spanned, lengths, squared_arm, len(part.unknowns))
-            ),
-            self.regularity_slot,
-        )
-        t.store(t.binary("add", before, t.load(moved)), self.correction_slot)
-        here = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
-        for leaf in own:
-            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], here))
+        have.update({leaf: t.load(slot) for leaf, slot in slots.items()})
+        block_regularity = self._write_regularity(volume, lengths, squared_arm, len(part.unknowns))
+        t.store(t.call_intrinsic("minnum", regularity, block_regularity), self.regularity_slot)
+        t.store(t.binary("add", correction, t.load(block_correction)), self.correction_slot)
+        position = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
+        for leaf in slots:
+            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], position))
 
     def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
         """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
@@ -407,50 +406,53 @@ class _DesignsKernelWriter(KernelWriter):
                     for k, value in zip(part.unknowns, solution, strict=True)
                 }
 
-    def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
+    def _write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.request.point_blocks is not None:
-            return t.binary("div", spanned, lengths)
-        least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
-        room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+            return t.binary("div", volume, lengths)
+        minimum = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
+        room = t.binary("sub", volume, t.binary("mul", lengths, t.constant(minimum)))
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged; `flags` judge what lies before it."""
         t, results, between_count = self.ir, self.results, len(flags)
-        told = [] if results is not None else [each * self.symbols["scale"] for each in self.output_expressions()]
+        scale, expressions = self.symbols["scale"], self.output_expressions() if results is None else []
         self._write_rates(have)
-        left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
+        judged = [self.equations.residuals(), self.counted_angles()]
+        residuals, counted, *columns = self.write_separately([*judged, *(row * scale for row in expressions)], have)
         flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
-        many = [each for of in values for each in of] if results is None else results.write_rows(self, have)
+        outputs = [value for column in columns for value in column]
+        if results is not None:
+            outputs = results.write_rows(self, have)
         if self.request.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
-            many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
-            many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        flags.append(write_closes(t, [*left, *self.write_circle_residuals(have)], "%tolerance"))
+            outputs += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
+            outputs += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
+        flags.append(write_closes(t, [*residuals, *self.write_circle_residuals(have)], "%tolerance"))
         if self.newton_unknowns:
-            least = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
-            flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
-            near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
-            flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
+            minimum = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
+            flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(minimum)))
+            is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
+            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
         passed = [self.write_passed(flags, self.passed_slot)]
-        pointers = result_pointers(t, self.lane, len(many), self.request.is_single)
+        pointers = result_pointers(t, self.lane, len(outputs), self.request.is_single)
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
         t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
         t.write_label("whole")
-        store_results(t, many, pointers, self.request.streams, self.request.is_single)
+        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
         t.write_line("br label %stepend")
         t.write_label("judged")
         if self.request.counts_candidates:
-            here = [*self.apart_here, *flags[between_count:]]
-            passed.append(self.write_passed(here, self.candidate_slot))
+            candidate_flags = [*self.apart_here, *flags[between_count:]]
+            passed.append(self.write_passed(candidate_flags, self.candidate_slot))
         if self.request.point_blocks is None:
-            many = [t.select(passed[-1][1], each, t.constant(nan)) for each in many]
-        store_results(t, many, pointers, self.request.streams, self.request.is_single)
+            outputs = [t.select(passed[-1][1], value, t.constant(nan)) for value in outputs]
+        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
-        for (_, slot, _), (before, now) in zip(self._counted(), passed, strict=True):
-            t.store(t.select(now, t.load(slot), t.select(before, step, t.load(slot))), slot)
+        for (_, slot, _), (previous, current) in zip(self._counted(), passed, strict=True):
+            t.store(t.select(current, t.load(slot), t.select(previous, step, t.load(slot))), slot)
         t.write_line("br label %stepend")
         t.write_label("stepend")
 

@@ -100,20 +100,20 @@ class KernelWriter(KernelInstructions):
         """
         t, form = self.ir, part.closed_form
         assert form is not None
-        greatest = 0.99 * LEAST_KERNEL_REGULARITY**2
-        most = t.constant(1.0 - greatest)
+        margin = 0.99 * LEAST_KERNEL_REGULARITY**2
+        maximum = t.constant(1.0 - margin)
         if form.squared_arm is None:
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
-            least = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
-            (most,) = self.write_values([1.0 - ca.fmin(greatest, least)], names)
-        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), most)
+            arm_margin = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
+            (maximum,) = self.write_values([1.0 - ca.fmin(margin, arm_margin)], names)
+        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), maximum)
 
     def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:
         """Two flags: all steps before passed, and this one by its own flags too, which is kept."""
-        before = self.ir.load_flags(slot)
-        passed = reduce(self.ir.and_flags, flags, before)
+        previous = self.ir.load_flags(slot)
+        passed = reduce(self.ir.and_flags, flags, previous)
         self.ir.store_flags(passed, slot)
-        return before, passed
+        return previous, passed
 
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
@@ -150,10 +150,10 @@ def write_small_rotation(t: IRWriter, c: str, s: str, angle: str) -> tuple[str, 
     return write_normalised(t, *write_angle_sum(t, c, s, cos, sin))
 
 
-def result_pointers(t: IRWriter, lane: str, many: int, is_single: bool) -> list[str]:
+def result_pointers(t: IRWriter, lane: str, row_count: int, is_single: bool) -> list[str]:
     """Where the rows of a step's results stand, for the designs from a lane on."""
     first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {lane}")
-    rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(many)]
+    rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(row_count)]
     return [(t.single_pointer if is_single else t.double_pointer)("%out", row) for row in rows]
 
 
@@ -169,13 +169,13 @@ def write_closes(t: IRWriter, residuals: Sequence[str], tolerance: str) -> str:
 
     What is not a number stays so in sums, and is not below anything.
     """
-    nothing = t.constant(0.0)
-    total = t.add_all([t.call_intrinsic("fabs", each) for each in residuals if each != nothing] or [nothing])
+    zero = t.constant(0.0)
+    total = t.add_all([t.call_intrinsic("fabs", value) for value in residuals if value != zero] or [zero])
     return t.compare("ole", total, t.broadcast(tolerance))
 
 
 def write_keeps_apart(
-    t: IRWriter, earlier: str, before: str, here: str, is_known: str | None = None, is_cosine: bool = False
+    t: IRWriter, earlier: str, previous: str, current: str, is_known: str | None = None, is_cosine: bool = False
 ) -> str:
     """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence or
     by its cosine.
@@ -185,15 +185,15 @@ def write_keeps_apart(
     dead point. `is_known`: flags of whether there are three positions already.
     """
     maximum = 1.0 - LEAST_KERNEL_REGULARITY**2
-    change = t.binary("sub", t.binary("add", here, earlier), t.binary("add", before, before))
+    change = t.binary("sub", t.binary("add", current, earlier), t.binary("add", previous, previous))
     change = t.call_intrinsic("fabs", change)
     half = t.constant(0.5)
     if is_known is not None:
         half = t.select_or_zero(is_known, half)
     if is_cosine:
-        earlier, before, here = (t.call_intrinsic("fabs", value) for value in (earlier, before, here))
+        earlier, previous, current = (t.call_intrinsic("fabs", value) for value in (earlier, previous, current))
         maximum = sqrt(maximum)
-    greatest = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
+    greatest = t.greater(earlier, t.greater(previous, current))  # NaN in `current` stays
     reached = t.binary("add", greatest, t.binary("mul", change, half))
     return t.compare("ole", reached, t.constant(maximum))
 

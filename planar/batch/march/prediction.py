@@ -50,7 +50,7 @@ def longest_step(offsets: Array) -> float:
 
 def correction_counts(steps: int, longest: float) -> Array:
     """How many of Newton's steps each step of a run takes (steps,), where inputs go so far in one at most."""
-    counts = np.full(steps, CORRECTIONS + sum(longest > each for each in COARSE_STEPS), dtype=np.int64)
+    counts = np.full(steps, CORRECTIONS + sum(longest > step for step in COARSE_STEPS), dtype=np.int64)
     counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
     return counts
 
