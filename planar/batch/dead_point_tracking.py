@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.checks import DesignFunctions, PointWriter, design_positions, pair_positions
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.runs import last_good_unknowns
 from planar.batch.march.stops import nearest_end
@@ -90,14 +90,14 @@ class _DesignCurves:
     """The curves of some designs; `SolutionCurve` in `solving` is that of one."""
 
     def __init__(self, batch: DesignBatch, design: Array, direction: Array):
-        self.functions = DesignFunctions(batch.functions, batch.p[:, design])
+        self.evaluation = DesignEvaluation(batch.select(design))
         self.start, self.direction = batch.u0.T[design], direction
 
     def inputs(self, y: Array) -> Array:
         return self.start + y[:, -1:] * self.direction
 
     def jacobians(self, y: Array) -> Array:
-        dz, du = self.functions.jacobians(y[:, :-1], self.inputs(y))
+        dz, du = self.evaluation.jacobians(y[:, :-1], self.inputs(y))
         return np.concatenate([dz, (du @ self.direction)[..., None]], axis=2)
 
     def correct(self, y: Array, normal: Array) -> tuple[Array, Array]:
@@ -105,7 +105,7 @@ class _DesignCurves:
         gap = np.full(len(y), np.inf)
         for _ in range(6):
             arguments = np.hstack([y[:, :-1], self.inputs(y)])
-            rates = self.functions.kinematics(arguments, 0.0 * arguments, 0.0 * arguments)
+            rates = self.evaluation.kinematics(arguments, 0.0 * arguments, 0.0 * arguments)
             gap = np.max(np.abs(rates.F), axis=1, initial=0.0)
             if np.all(gap <= 1e-15):
                 break
@@ -123,7 +123,7 @@ class _DesignCurves:
         jacobian = self.jacobians(y)
         tangent = self.tangents(jacobian, towards)
         rates = np.hstack([tangent[:, :-1], tangent[:, -1:] * self.direction])
-        second = self.functions.kinematics(np.hstack([y[:, :-1], self.inputs(y)]), rates, 0.0 * rates).F2
+        second = self.evaluation.kinematics(np.hstack([y[:, :-1], self.inputs(y)]), rates, 0.0 * rates).F2
         curvature = _solve_bordered(jacobian, tangent, -second, 0.0)
         sizes = column_norms(jacobian, MIN_COLUMN_NORM)[:, None]
         difference = (self.jacobians(y + DIFFERENCE_STEP * tangent) - jacobian) / sizes
@@ -194,7 +194,7 @@ class _DeadPointTracker:
         y = np.hstack([z[active], self.distances[self.good_steps[active] - 1][:, None]])
         curves = _DesignCurves(self.batch, active, self.direction)
         if self.turns.size and self.batch.stops is not None:
-            positions = pair_positions(self.batch.select(active), y[:, :-1].T, curves.inputs(y).T)
+            positions = curves.evaluation.pair_positions(y[:, :-1].T, curves.inputs(y).T)
             self.turns[:, active] = self.batch.stops.select(active).turns_between(positions)
         towards = np.zeros_like(y)
         towards[:, -1] = 1.0
@@ -240,7 +240,7 @@ class _DeadPointTracker:
         stops, batch = self.batch.stops, self.batch.select(design)
         assert stops is not None
         u = batch.u0 + y[:, -1] * self.direction[:, None]
-        positions = pair_positions(batch, y[:, :-1].T, u) + self.turns[:, design]
+        positions = DesignEvaluation(batch).pair_positions(y[:, :-1].T, u) + self.turns[:, design]
         return np.minimum(positions - stops.low[:, design], stops.high[:, design] - positions)
 
     def _judge_stops(self, arcs: _CurveArcs) -> tuple[Array, Array]:
@@ -318,10 +318,10 @@ class _DeadPointTracker:
         place = self.distances[step]
         y, fine = self._find_falling_zero(arcs, lambda y: place - y[:, -1])
         batch = self.batch.select(arcs.design, y[:, :-1].T)
-        functions = DesignFunctions(batch.functions, batch.p)
+        evaluation = DesignEvaluation(batch)
         u = batch.u0 + place * self.direction[:, None]
-        z = functions.correct(y[:, :-1], u.T)
+        z = evaluation.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
-        row = design_positions(functions, batch, z, u)
-        fine &= row.passed & PointWriter(batch, functions).write(out, row)
+        positions = evaluation.positions(z, u)
+        fine &= evaluation.accepts(positions) & evaluation.write_points(out, positions)
         return out, fine

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.checks import pair_positions
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.stops import (
     LEAST_RANGES,
@@ -100,7 +100,8 @@ class DesignStops:
             return
         some = np.flatnonzero(np.isfinite(batch.z0).all(axis=0) & np.isfinite(u).all(axis=0))
         own = batch._replace(stops=self.limits).select(some)
-        rooms = self.limits.select(some).find_rooms(pair_positions(own, own.z0, u[:, some])).min(axis=0)
+        positions = DesignEvaluation(own).pair_positions(own.z0, u[:, some])
+        rooms = self.limits.select(some).find_rooms(positions).min(axis=0)
         self.is_outside[some] |= self.is_fit[some] & (rooms < -SURE_DISTANCE)
         self.is_fit[some] &= rooms > SURE_DISTANCE
 

@@ -121,13 +121,13 @@ class FormulaInput(NamedTuple):
 
 
 class BlockFormula:
-    """A list of instructions with the numbers of its outputs and inputs."""
+    """A list of instructions with the numbers of its outputs and inputs, and in `order` those of all values needed."""
 
-    def __init__(
-        self, instructions: InstructionList[FormulaInput], outputs: tuple[int, ...], inputs: dict[int, FormulaInput]
-    ):
-        self.instructions, self.outputs, self.inputs = instructions, outputs, inputs
+    def __init__(self, instructions: InstructionList[FormulaInput], outputs: Sequence[int]):
+        self.instructions, self.outputs = instructions, outputs
         self.order = required_values(instructions, outputs)
+        keys = ((number, instructions.instructions[number].key) for number in self.order)
+        self.inputs = {number: key for number, key in keys if key is not None}
 
 
 class TapeFormula(NamedTuple):
@@ -320,6 +320,16 @@ def write_turn_flags(
             minimum = t.binary("mul", square, minimum)
         # NaN before the first step passes
         is_good = t.and_flags(is_good, t.compare("uge", along, minimum))
+    return is_good
+
+
+def write_turn_check(
+    t: IRWriter, is_good: str, directions: Sequence[LinkDirection], slots: Sequence[str], least_cosine: float
+) -> str:
+    """The same, with x and y of each direction in slots: those of the step before, then those of this step."""
+    is_good = write_turn_flags(t, is_good, directions, [t.load(slot) for slot in slots], least_cosine)
+    for value, slot in zip((part for direction in directions for part in direction[:2]), slots, strict=True):
+        t.store(value, slot)
     return is_good
 
 

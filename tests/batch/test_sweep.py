@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.march import runs
-from planar.batch.march.checks import DesignResidualCheck
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.document.dimensions import link_lengths
@@ -196,9 +196,9 @@ def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     u = np.repeat(solver.inputs.u[:, None], 3, axis=1)
     z[0, 1] += 1e-9
     p[-1, 2] += 1e-9
-    w = solver.functions.coordinates(z.T, u.T, p.T).T
-    left = DesignResidualCheck(solver.mechanism, solver.functions, p).worst_residual(w, u)
-    assert (left <= solver.tolerance).tolist() == [True, False, False]
+    batch = reference_design(solver.mechanism, None).design_batch({}, p, (u, 0.0 * u, 0.0 * u), ())
+    evaluation = DesignEvaluation(batch._replace(tolerance=solver.tolerance))
+    assert evaluation.is_closed(evaluation.positions(z.T, u)).tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize("rates", [True, False])

@@ -10,14 +10,7 @@ from planar.batch.closed_form.dead_points import DeadPoints, search_dead_points
 from planar.batch.closed_form.joined_blocks import BlockJoiner, find_joiner
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.march.checks import (
-    DesignFunctions,
-    DesignsAtStep,
-    PointWriter,
-    find_sensitivities,
-    make_residual_check,
-    pair_positions,
-)
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import unknowns_from_state
 from planar.batch.march.runs import run_designs
@@ -65,7 +58,7 @@ class ClosedFormDesigns:
     def stop_positions(self, moved: Array) -> Array:
         """Where the pairs with stops are (stops, designs) when the input has moved so far (designs,)."""
         u = self.batch.u0 + moved * self.direction[:, None]
-        return pair_positions(self.batch, self.find_unknowns(self.batch, self.signs, u), u)
+        return DesignEvaluation(self.batch).pair_positions(self.find_unknowns(self.batch, self.signs, u), u)
 
     def _where_stops_are(self, dead_points: DeadPoints, sense: Array) -> DeadPoints:
         """The same, but nothing where a stop is none: what tells where stops are is nothing elsewhere too."""
@@ -211,9 +204,8 @@ def _points_at_limit(
     with np.errstate(all="ignore"):  # the Jacobian is singular there
         state = 2.0 * middle(DISTANCE_FROM_LIMIT) - middle(2.0 * DISTANCE_FROM_LIMIT)
         z = unknowns_from_state(joiner.state, state, len(batch.z0)).T
-        u, functions = batch.u0 + moved * designs.direction[:, None], DesignFunctions(batch.functions, batch.p)
-        w = functions.coordinates(z, u.T)
-        passed = make_residual_check(batch).worst_residual(w, u) <= batch.tolerance
-        positions = find_sensitivities(functions, z, u.T)
-        PointWriter(batch, functions).write(rows, DesignsAtStep(z, u, w, passed, positions))
+        evaluation = DesignEvaluation(batch)
+        positions = evaluation.positions(z, batch.u0 + moved * designs.direction[:, None])
+        passed = evaluation.is_closed(positions)
+        evaluation.write_points(rows, positions)
     return rows, passed

@@ -127,7 +127,7 @@ class BlockJoinWriter(KernelWriter):
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
         names: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
         names |= self.stop_number_names(lambda k: self.load_entry("%p", k))
-        names |= {operand: self.load_entry("%drive", k) for k, operand in enumerate(self.input_operands)}
+        names |= {operand: self.load_entry("%drive", k) for k, operand in enumerate(self.equations.input_operands)}
         return names | {("sign", k): self.load_entry("%sign", k) for k in range(len(self.equations.blocks))}
 
     def close_function(self, again: str) -> str:

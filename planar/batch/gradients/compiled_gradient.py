@@ -155,7 +155,7 @@ class _AdjointWriter(KernelWriter):
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
         self.lane = t.add_instruction(f"mul i64 %b, {t.lanes}")
-        inputs = {operand: self.load_entry("%inputs", k) for k, operand in enumerate(self.input_operands)}
+        inputs = {operand: self.load_entry("%inputs", k) for k, operand in enumerate(self.equations.input_operands)}
         have |= write_shifted_inputs(t, self.equations, inputs, have)
         have |= self._load_states()
         for k in range(len(self.rows)):

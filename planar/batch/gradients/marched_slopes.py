@@ -24,7 +24,6 @@ from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.derivatives.design_equations import DesignEquations, design_equations
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_by_determinants
 from planar.equations.mechanism_numbers import scale_lengths
@@ -206,15 +205,13 @@ class _SlopeWriter:
             points = self.kernel.point_coordinates(range(len(results.points)))
             values_and_units.append((points, 2, ca.repmat(scale, points.numel(), 1)))
         if results.links:
-            angles = [ca.SX(equations.frame(link).angle) for link in results.links]
+            angles = [ca.SX(equations.frames[link].angle) for link in results.links]
             values_and_units.append((ca.vertcat(*angles), 1, ca.SX.ones(len(angles))))
         if results.pairs:
             mechanism = rows.reference.mechanism
             motions = [relative_motions(mechanism)[name] for name in results.pairs]
-            pairs = {pair.name: pair for pair in equations.mechanism.pairs}
-            _, own = frames_from_coordinates(ca.vertsplit(e.w), equations.column_of, (), pairs)
-            frames = {link.name: equations.frame(link.name) for link in equations.mechanism.links}
-            values = input_positions(motions, frames, split_pair_numbers(equations.mechanism.pairs, e.p), own)
+            numbers = split_pair_numbers(equations.mechanism.pairs, e.p)
+            values = input_positions(motions, equations.frames, numbers, equations.pair_coordinates)
             units = [scale if each.input_kind is MeasureKind.LENGTH else ca.SX(1.0) for each in motions]
             values_and_units.append((stack_expressions(values), 1, ca.vertcat(*units)))
         return values_and_units

@@ -115,9 +115,9 @@ def erase_from_steps(out: Array, first: Array) -> None:
 
 def erase_between(out: Array, first: Array, end: Array) -> None:
     """Make out (steps + 1, rows, designs) no number from a step of each design on, up to another (designs,)."""
-    many = np.maximum(end - first, 0)
-    if not many.any():
+    counts = np.maximum(end - first, 0)
+    if not counts.any():
         return
-    design = np.repeat(np.arange(len(first)), many)
-    begins = np.repeat(first - (np.cumsum(many) - many), many)
+    design = np.repeat(np.arange(len(first)), counts)
+    begins = np.repeat(first - (np.cumsum(counts) - counts), counts)
     out[begins + np.arange(len(design)), :, design] = np.nan

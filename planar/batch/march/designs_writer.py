@@ -6,6 +6,8 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from itertools import chain
 from math import cos, inf, nan
 from typing import NamedTuple
 
@@ -14,15 +16,15 @@ import casadi as ca
 from planar.batch.march.design_batch import ResultRows
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.kernel_writer import (
-    STATE_GIVEN,
-    DesignsKernelLayout,
-    KernelStart,
     KernelWriter,
     OperandNames,
     result_pointers,
     store_results,
+    write_angle_sum,
     write_closes,
     write_keeps_apart,
+    write_normalised,
+    write_small_rotation,
     write_turns_little,
 )
 from planar.batch.march.prediction import (
@@ -33,8 +35,9 @@ from planar.batch.march.prediction import (
     least_regularity,
 )
 from planar.codegen.llvm_linear import LinearSystems
-from planar.codegen.tape import LinkDirection, write_turn_flags
-from planar.equations.linear import solve_by_determinants
+from planar.codegen.tape import LinkDirection, write_turn_check
+from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
 
 MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
@@ -56,7 +59,9 @@ class KernelRequest(NamedTuple):
     counts. With `point_blocks`, the block that places each point, a step has further rows: x and y of every point in
     the other assembly of its block (infinite where that is not known), the state, and the regularity of the least
     regular block that Newton's method solves. Rows bypass the caches where it `streams`; where it `is_single`, they are
-    rounded. `results` are written in place of the points.
+    rounded. `results` are written in place of the points. The function starts with `has_signs`, where all blocks are in
+    closed form, from the signs of their assemblies in place of the state; with `has_common_inputs` too, all designs
+    have the same inputs, which stand in the table.
     """
 
     equations: KernelEquations
@@ -64,11 +69,26 @@ class KernelRequest(NamedTuple):
     rates: bool
     lanes: int
     point_blocks: tuple[int, ...] | None = None
-    start: KernelStart = STATE_GIVEN
+    has_signs: bool = False
+    has_common_inputs: bool = False
     streams: bool = True
     is_single: bool = False
     counts_candidates: bool = False
     results: ResultRows | None = None
+
+
+class DesignsKernelLayout(NamedTuple):
+    """The function of a request, and the rows that it takes and writes, each with an entry for every design.
+
+    `state`: cos and sin of an angle, or a length, and an angle that is carried; `inputs`: the same of the inputs;
+    `output_row_count`: of the rows of a step.
+    """
+
+    request: KernelRequest
+    state: tuple[Operand, ...]
+    inputs: tuple[Operand, ...]
+    output_row_count: int
+    ir: str
 
 
 def write_designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
@@ -81,19 +101,19 @@ def write_designs_kernel(request: KernelRequest) -> DesignsKernelLayout:
             if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
             carried |= {angle.operand}
-            request = request._replace(start=STATE_GIVEN)
+            request = request._replace(has_signs=False, has_common_inputs=False)
 
 
 class _DesignsKernelWriter(KernelWriter):
     def __init__(self, request: KernelRequest, carried: frozenset[Operand]):
         equations = request.equations
         super().__init__(equations, request.links, request.rates, request.lanes, INVARIANT_KINDS, carried)
-        self.request, self.start, self.results = request, request.start, request.results
+        self.request, self.results = request, request.results
         self.other_points: dict[int, list[str]] = {}
         self.apart_here: list[str] = []
         "flags of blocks in closed form whose assemblies are apart at a step"
         self.state = self.state_operands()
-        if self.start.has_signs:
+        if request.has_signs:
             self.state = tuple(("sign", k) for k in range(len(equations.closed_forms)))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
@@ -156,7 +176,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_line("}")
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
-        return DesignsKernelLayout(self.state, self.input_operands, rows, t.module_text(), t.lanes, self.start)
+        return DesignsKernelLayout(self.request, self.state, self.equations.input_operands, rows, t.module_text())
 
     def _write_lanes_start(self) -> tuple[OperandNames, OperandNames]:
         """A block of designs begins: its numbers, and the inputs at the start."""
@@ -173,9 +193,9 @@ class _DesignsKernelWriter(KernelWriter):
         if self.rates:
             have |= {(f"u{1 + k // count}", k % count): self.load_entry("%rate", k) for k in range(2 * count)}
         t.mark_hoist_point()
-        at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.input_operands)}
+        at_start = {leaf: self.load_entry("%drive", k) for k, leaf in enumerate(self.equations.input_operands)}
         state = {leaf: self.load_entry("%state", k) for k, leaf in enumerate(self.state)}
-        if self.start.has_signs:
+        if self.request.has_signs:
             have |= state
         elif self.equations.closed_forms:
             sides = self.write_values([self.equations.sides], have | at_start | state)
@@ -189,8 +209,8 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
         t.store_flags("splat (i1 true)", self.passed_slot)
         t.store_flags("splat (i1 true)", self.candidate_slot)
-        for each in (self.good_count_slot, self.candidate_count_slot, *(slot for of in self.bend_slots for slot in of)):
-            t.store("zeroinitializer", each)
+        for slot in (self.good_count_slot, self.candidate_count_slot, *chain.from_iterable(self.bend_slots)):
+            t.store("zeroinitializer", slot)
         for slot in (slot for both in self.turn_slots.values() for slot in both):
             t.store(t.constant(nan), slot)
         t.write_line("br label %step")
@@ -213,12 +233,12 @@ class _DesignsKernelWriter(KernelWriter):
         self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
         for k, turns in enumerate(self.equations.input_is_angle):
             by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
-            if self.start.has_common_inputs:
+            if self.request.has_common_inputs:
                 have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
                 continue
             have["u", k] = t.binary("add", at_start["u", k], by)
             if turns:
-                have["uc", k], have["us", k] = self.write_angle_sum(at_start["uc", k], at_start["us", k], cos, sin)
+                have["uc", k], have["us", k] = write_angle_sum(t, at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.regularity_slot)
         t.store("zeroinitializer", self.correction_slot)
         self.history_indices = [
@@ -232,7 +252,7 @@ class _DesignsKernelWriter(KernelWriter):
             self._write_other_assembly(part, have)
         near = self.write_closed_form(part, have, as_cosine=True)
         for k in part.unknowns:
-            if self.is_carried(("z", k)):
+            if ("z", k) in self.carried:
                 self._write_carried_angle(k, have)
         if self.request.counts_candidates:
             self.apart_here.append(self.write_apart_here(part, near, have))
@@ -247,21 +267,19 @@ class _DesignsKernelWriter(KernelWriter):
         By as much as it bends over the last three steps. So it may be the step before at which it had come too near.
         """
         t = self.ir
-        before, earlier = (t.load(slot) for slot in slots)
-        for slot, new in zip(slots, (value, before), strict=True):
+        previous, earlier = (t.load(slot) for slot in slots)
+        for slot, new in zip(slots, (value, previous), strict=True):
             t.store(new, slot)
-        return write_keeps_apart(t, earlier, before, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
+        return write_keeps_apart(t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
 
     def _write_turns(self, have: OperandNames) -> list[str]:
         """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,
         steps do not show what these blocks do between them."""
-        t, flag = self.ir, "splat (i1 true)"
+        if not self.turn_slots:
+            return []
         directions = [LinkDirection(have["zc", k], have["zs", k], None) for k in self.turn_slots]
         slots = [slot for both in self.turn_slots.values() for slot in both]
-        flag = write_turn_flags(t, flag, directions, [t.load(slot) for slot in slots], cos(MAX_TURN_PER_STEP))
-        for slot, value in zip(slots, (part for direction in directions for part in direction[:2]), strict=True):
-            t.store(value, slot)
-        return [flag] if slots else []
+        return [write_turn_check(self.ir, "splat (i1 true)", directions, slots, cos(MAX_TURN_PER_STEP))]
 
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""
@@ -274,20 +292,20 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the block places its points in its other assembly."""
         assert self.request.point_blocks is not None
-        level, there = part.block.block_index, dict(have)
-        there["sign", self.sign_index[level]] = self.ir.add_instruction(
+        level, other = part.block.block_index, dict(have)
+        other["sign", self.sign_index[level]] = self.ir.add_instruction(
             f"fneg {self.ir.vector} {have['sign', self.sign_index[level]]}"
         )
-        self.write_closed_form(part, there)
-        points = [k for k, each in enumerate(self.request.point_blocks) if each == level]
-        places = self.write_values([self.point_coordinates(points)], there)
+        self.write_closed_form(part, other)
+        points = [k for k, block in enumerate(self.request.point_blocks) if block == level]
+        places = self.write_values([self.point_coordinates(points)], other)
         self.other_points |= {k: places[2 * n : 2 * n + 2] for n, k in enumerate(points)}
 
     def _write_carried_angle(self, k: int, have: OperandNames) -> None:
         """Move an angle's own value on to where its new cos and sin are."""
         t = self.ir
         c, s = (t.load(self.state_slots[leaf, k]) for leaf in ("zc", "zs"))
-        cos, sin = self.write_angle_sum(have["zc", k], have["zs", k], c, t.add_instruction(f"fneg {t.vector} {s}"))
+        cos, sin = write_angle_sum(t, have["zc", k], have["zs", k], c, t.add_instruction(f"fneg {t.vector} {s}"))
         half = t.call_per_lane("atan", t.binary("div", sin, t.binary("add", t.constant(1.0), cos)))
         have["z", k] = t.binary("add", t.load(self.state_slots["z", k]), t.binary("add", half, half))
         for leaf in ("zc", "zs", "z"):
@@ -296,129 +314,145 @@ class _DesignsKernelWriter(KernelWriter):
     def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
         """Newton's method for a block from where it would be if it went on as before, so often as the step says."""
         t, level = self.ir, part.block.block_index
-        own = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
+        slots = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
         ahead = {
             leaf: t.add_all(
                 [
-                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], at)))
-                    for w, at in zip(self.predictor_weights, self.history_indices, strict=True)
+                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], index)))
+                    for w, index in zip(self.predictor_weights, self.history_indices, strict=True)
                 ]
             )
-            for leaf in own
+            for leaf in slots
         }
         for k in part.unknowns:
             if self.equations.is_angle[k]:
-                ahead["zc", k], ahead["zs", k] = self.write_normalised(ahead["zc", k], ahead["zs", k])
-        for leaf, slot in own.items():
+                ahead["zc", k], ahead["zs", k] = write_normalised(t, ahead["zc", k], ahead["zs", k])
+        for leaf, slot in slots.items():
             t.store(ahead[leaf], slot)
         count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
-        strong, before = t.load(self.regularity_slot), t.load(self.correction_slot)
-        moved = self.block_correction_slots[level]
-        t.store("zeroinitializer", moved)
+        regularity, correction = t.load(self.regularity_slot), t.load(self.correction_slot)
+        block_correction = self.block_correction_slots[level]
+        t.store("zeroinitializer", block_correction)
         t.write_line(f"br label %from{level}")
         t.write_label(f"from{level}")
         t.write_line(f"br label %newton{level}")
         t.write_label(f"newton{level}")
         t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
-        now = {leaf: t.load(slot) for leaf, slot in own.items()}
-        *delta, spanned, lengths, squared_arm = self._write_newton_step(part, have | now)
-        far = []
-        for k, each in zip(part.unknowns, delta, strict=True):
-            far.append(t.call_intrinsic("fabs", each))
-            back = t.add_instruction(f"fneg {t.vector} {each}")
-            if ("z", k) in now:
-                now["z", k] = t.binary("add", now["z", k], back)
-            if self.is_carried(("z", k)):
-                now["zc", k], now["zs", k] = t.call_per_lane("cos", now["z", k]), t.call_per_lane("sin", now["z", k])
+        unknowns = {leaf: t.load(slot) for leaf, slot in slots.items()}
+        *steps, volume, lengths, squared_arm = self._write_newton_step(part, have | unknowns)
+        magnitudes = []
+        for k, step in zip(part.unknowns, steps, strict=True):
+            magnitudes.append(t.call_intrinsic("fabs", step))
+            back = t.add_instruction(f"fneg {t.vector} {step}")
+            if ("z", k) in unknowns:
+                unknowns["z", k] = t.binary("add", unknowns["z", k], back)
+            if ("z", k) in self.carried:
+                angle = unknowns["z", k]
+                unknowns["zc", k], unknowns["zs", k] = t.call_per_lane("cos", angle), t.call_per_lane("sin", angle)
             elif self.equations.is_angle[k]:
-                now["zc", k], now["zs", k] = self.write_small_rotation(now["zc", k], now["zs", k], back)
-        for leaf, slot in own.items():
-            t.store(now[leaf], slot)
-        t.store(t.add_all([t.load(moved), *far]), moved)
+                c, s = unknowns["zc", k], unknowns["zs", k]
+                unknowns["zc", k], unknowns["zs", k] = write_small_rotation(t, c, s, back)
+        for leaf, slot in slots.items():
+            t.store(unknowns[leaf], slot)
+        t.store(t.add_all([t.load(block_correction), *magnitudes]), block_correction)
         t.close_loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
         t.write_label(f"solved{level}")
-        have.update({leaf: t.load(slot) for leaf, slot in own.items()})
-        t.store(
-            t.call_intrinsic(
-                "minnum", strong, self._write_regularity(spanned, lengths, squared_arm, len(part.unknowns))
-            ),
-            self.regularity_slot,
-        )
-        t.store(t.binary("add", before, t.load(moved)), self.correction_slot)
-        here = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
-        for leaf in own:
-            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], here))
+        have.update({leaf: t.load(slot) for leaf, slot in slots.items()})
+        block_regularity = self._write_regularity(volume, lengths, squared_arm, len(part.unknowns))
+        t.store(t.call_intrinsic("minnum", regularity, block_regularity), self.regularity_slot)
+        t.store(t.binary("add", correction, t.load(block_correction)), self.correction_slot)
+        position = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
+        for leaf in slots:
+            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], position))
 
     def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
-        """See `KernelEquations.newton_step`."""
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
+        and the square of the shortest: where it vanishes, as with the arm of a slide on which a link turns, an unknown
+        is not determined, however far the others' columns are from each other."""
+        e, block = self.equations.equations, part.block
+        residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
+        squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
         if not part.is_large:
-            return self.write_values(self.equations.newton_step(part.block), names)
+            return self.write_values([*solve_with_volume(jacobian, residual), squared_arm], names)
         assert self.linear_systems is not None
-        residuals, columns, squared_arm = self.write_separately(self.newton_system(part), names)
-        least = self.linear_systems.factorise(columns, len(residuals))
-        return [*self.linear_systems.solve(residuals), least, self.ir.constant(1.0), *squared_arm]
+        residuals, columns, arms = self.write_separately([residual, ca.vec(jacobian), squared_arm], names)
+        volume = self.linear_systems.factorise(columns, len(residuals))
+        return [*self.linear_systems.solve(residuals), volume, self.ir.constant(1.0), *arms]
 
     def _write_rates(self, have: OperandNames) -> None:
-        """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers."""
-        t = self.ir
-        for part, system in zip(self.equations.blocks, self.rate_systems(), strict=False):
+        """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers.
+
+        They are minus the Jacobian's inverse times right sides in symbols for the rates that are known before: the
+        first ones of earlier blocks for the first, all the first ones and the second ones of earlier blocks for the
+        second.
+        """
+        if not (self.rates and self.solves_rates_apart):
+            return
+        t, e, s = self.ir, self.equations.equations, self.symbols
+        rates, y1, y2 = UnknownRates(e), ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])
+        right_sides = zip(rates.right_sides(y1), rates.right_sides(y1, y2), strict=True)
+        for part, (first, second) in zip(self.equations.blocks, right_sides, strict=True):
+            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
             if part.is_large:
                 assert self.linear_systems is not None
-                self.linear_systems.factorise(self.write_values([ca.vec(system.jacobian)], have), len(part.unknowns))
-            for name, right_side in (("z1", system.first), ("z2", system.second)):
+                self.linear_systems.factorise(self.write_values([ca.vec(jacobian)], have), len(part.unknowns))
+            for name, right_side in (("z1", first), ("z2", second)):
                 if part.is_large and self.linear_systems is not None:
-                    found = self.linear_systems.solve(self.write_values([right_side], have))
+                    solution = self.linear_systems.solve(self.write_values([right_side], have))
                 else:
-                    found = self.write_values([solve_by_determinants(system.jacobian, right_side)], have)
+                    solution = self.write_values([solve_by_determinants(jacobian, right_side)], have)
                 have |= {
                     (name, k): t.add_instruction(f"fneg {t.vector} {value}")
-                    for k, value in zip(part.unknowns, found, strict=True)
+                    for k, value in zip(part.unknowns, solution, strict=True)
                 }
 
-    def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
+    def _write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.request.point_blocks is not None:
-            return t.binary("div", spanned, lengths)
-        least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
-        room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+            return t.binary("div", volume, lengths)
+        minimum = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
+        room = t.binary("sub", volume, t.binary("mul", lengths, t.constant(minimum)))
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged; `flags` judge what lies before it."""
         t, results, between_count = self.ir, self.results, len(flags)
-        told = [] if results is not None else [each * self.symbols["scale"] for each in self.output_expressions()]
+        scale, expressions = self.symbols["scale"], self.output_expressions() if results is None else []
         self._write_rates(have)
-        left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
+        judged = [self.equations.residuals(), self.counted_angles()]
+        residuals, counted, *columns = self.write_separately([*judged, *(row * scale for row in expressions)], have)
         flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
-        many = [each for of in values for each in of] if results is None else results.write_rows(self, have)
+        outputs = [value for column in columns for value in column]
+        if results is not None:
+            outputs = results.write_rows(self, have)
         if self.request.point_blocks is not None:
             nowhere = [t.constant(inf)] * 2
-            many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
-            many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        flags.append(write_closes(t, [*left, *self.write_circle_residuals(have)], "%tolerance"))
+            outputs += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
+            outputs += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
+        flags.append(write_closes(t, [*residuals, *self.write_circle_residuals(have)], "%tolerance"))
         if self.newton_unknowns:
-            least = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
-            flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
-            near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
-            flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
+            minimum = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
+            flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(minimum)))
+            is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
+            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
         passed = [self.write_passed(flags, self.passed_slot)]
-        pointers = result_pointers(t, self.lane, len(many), self.request.is_single)
+        pointers = result_pointers(t, self.lane, len(outputs), self.request.is_single)
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
         t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
         t.write_label("whole")
-        store_results(t, many, pointers, self.request.streams, self.request.is_single)
+        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
         t.write_line("br label %stepend")
         t.write_label("judged")
         if self.request.counts_candidates:
-            here = [*self.apart_here, *flags[between_count:]]
-            passed.append(self.write_passed(here, self.candidate_slot))
+            candidate_flags = [*self.apart_here, *flags[between_count:]]
+            passed.append(self.write_passed(candidate_flags, self.candidate_slot))
         if self.request.point_blocks is None:
-            many = [t.select(passed[-1][1], each, t.constant(nan)) for each in many]
-        store_results(t, many, pointers, self.request.streams, self.request.is_single)
+            outputs = [t.select(passed[-1][1], value, t.constant(nan)) for value in outputs]
+        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
-        for (_, slot, _), (before, now) in zip(self._counted(), passed, strict=True):
-            t.store(t.select(now, t.load(slot), t.select(before, step, t.load(slot))), slot)
+        for (_, slot, _), (previous, current) in zip(self._counted(), passed, strict=True):
+            t.store(t.select(current, t.load(slot), t.select(previous, step, t.load(slot))), slot)
         t.write_line("br label %stepend")
         t.write_label("stepend")
 

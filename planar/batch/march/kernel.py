@@ -22,12 +22,20 @@ from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.generic_evaluation import inline_function
-from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.linear import solve_by_determinants
 from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
-from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
+from planar.equations.rates import UnknownRates, first_and_second_rates
+from planar.equations.residuals import (
+    Frames,
+    PairValues,
+    closing_error,
+    input_positions,
+    residuals,
+    scalars,
+    split_pair_numbers,
+)
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
-from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
+from planar.foundation.geometry import Vector
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
@@ -69,18 +77,6 @@ class KernelBlock(NamedTuple):
         return len(self.unknowns) > MAX_EXPRESSION_UNKNOWNS
 
 
-class RateSystem(NamedTuple):
-    """What the rates of a block's unknowns follow from: minus the Jacobian's inverse times the right sides.
-
-    In symbols for the rates of unknowns that are known before: the first for the first, and all the first ones and the
-    second ones of earlier blocks for the second.
-    """
-
-    jacobian: ca.SX
-    first: ca.SX
-    second: ca.SX
-
-
 class KernelEquations:
     """A mechanism's equations with the blocks' closed forms. Raises UnsupportedOperation where a block holds itself
     twice.
@@ -109,7 +105,13 @@ class KernelEquations:
         self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.has_large_blocks = any(part.is_large for part in self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
-        self.column_of = coordinate_columns(e.coordinates)
+        self.frames, self.pair_coordinates = frames_from_coordinates(
+            ca.vertsplit(e.w),
+            coordinate_columns(e.coordinates),
+            [link.name for link in mechanism.links],
+            {pair.name: pair for pair in mechanism.pairs},
+        )
+        "of all links, and of pairs by name, as expressions"
         self.input_operands: tuple[Operand, ...] = tuple(
             operand
             for k, is_angle in enumerate(self.input_is_angle)
@@ -130,70 +132,39 @@ class KernelEquations:
 
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
-        found: np.ndarray = np.sign(self._sides_function(z, u, p).full())
-        return found.ravel() if z.ndim == 1 else found
+        signs: np.ndarray = np.sign(self._sides_function(z, u, p).full())
+        return signs.ravel() if z.ndim == 1 else signs
 
     @cached_property
     def _sides_function(self) -> ca.Function:
         e = self.equations
         return ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])
 
-    def frame(self, link: str) -> Frame:
-        """Where a link is, as expressions."""
-        if (link, "x") not in self.column_of:
-            return GROUND
-        return frame_at(*(self.equations.w[self.column_of[link, part]] for part in ("x", "y", "angle")))
-
     def residuals(self) -> ca.SX:
         """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
 
         Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
         """
-        e, pairs = self.equations, self.mechanism.pairs
-        _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), {pair.name: pair for pair in pairs})
-        frames = {link.name: self.frame(link.name) for link in self.mechanism.links}
-        rows = residuals(self.mechanism, frames, split_pair_numbers(pairs, e.p), own, scalars(e.u))
-        return ca.vertcat(*(closing_error(value, row.kind) for row, value in rows))
+        return closing_errors(self.equations, self.mechanism, self.frames, self.pair_coordinates)
 
     def stop_coalescences(self, numbers: ca.SX) -> ca.SX:
         """For each pair with stops what reaches one where it meets one of them; see `StopLimits`."""
-        e = self.equations
-        pairs = {pair.name: pair for pair in self.mechanism.pairs}
-        _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), pairs)
-        positions = [
-            pair.input_position([self.frame(link) for link in pair.bodies], (), own.get(pair.name, ()))
-            for pair in self.stop_pairs
-        ]
+        positions = input_positions(self.stop_pairs, self.frames, {}, self.pair_coordinates)
         periodic = are_periodic(self.stop_pairs, self.mechanism)
-        return ca.vertcat(ca.SX(0, 1), *(1.0 - each for each in stop_rooms(positions, periodic, scalars(numbers), ca)))
+        return ca.vertcat(ca.SX(0, 1), *(1.0 - room for room in stop_rooms(positions, periodic, scalars(numbers), ca)))
 
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """First and second rates of the unknowns, block after block."""
         return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
 
-    def rate_systems(self, z1: ca.SX, z2: ca.SX, u1: ca.SX, u2: ca.SX) -> list[RateSystem]:
-        """The systems of all blocks, in symbols for the rates of unknowns and of inputs."""
-        rates, blocks = UnknownRates(self.equations), self.equations.blocks
-        firsts = rates.right_sides(ca.vertcat(z1, u1))
-        seconds = rates.right_sides(ca.vertcat(z1, u1), ca.vertcat(z2, u2))
-        jacobians = [each for each, of in zip(rates.jacobians, blocks, strict=True) if slice_length(of.unknowns)]
-        return [RateSystem(*each) for each in zip(jacobians, firsts, seconds, strict=True)]
 
-    def newton_step(self, block: Block) -> list[ca.SX]:
-        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
-        and the square of the least of these."""
-        e = self.equations
-        jacobian = block_jacobian(e, block.rows, block.unknowns)
-        return [*solve_with_volume(jacobian, e.F[block.rows]), _squared_arm(jacobian)]
-
-
-def _squared_arm(jacobian: ca.SX) -> ca.SX:
-    """The square of a Jacobian's shortest column: where it vanishes, as with the arm of a slide on which a link turns,
-    an unknown is not determined, however far the others' columns are from each other."""
-    least = ca.SX(1.0)
-    for k in range(jacobian.shape[1]):
-        least = ca.fmin(least, ca.sumsqr(jacobian[:, k]))
-    return least
+def closing_errors(
+    e: ConstraintEquations, mechanism: Mechanism, frames: Frames, pair_coordinates: PairValues, first_input: int = 0
+) -> ca.SX:
+    """The residual of every constraint with links at `frames`, and its inputs in u from the first one on."""
+    numbers = split_pair_numbers(mechanism.pairs, e.p)
+    rows = residuals(mechanism, frames, numbers, pair_coordinates, scalars(e.u)[first_input:])
+    return ca.vertcat(ca.SX(0, 1), *(closing_error(value, row.kind) for row, value in rows))
 
 
 @lru_cache(maxsize=256)
@@ -248,21 +219,14 @@ class KernelInstructions:
         self.sign_index = {
             part.block.block_index: k for k, part in enumerate(p for p in equations.blocks if p.closed_form is not None)
         }
-        self.input_operands = equations.input_operands
-
-    def is_carried(self, operand: Operand) -> bool:
-        """Whether an angle's own value is carried beside its cos and sin."""
-        return operand in self.carried
-
-    def unknown_operands(self, k: int) -> list[Operand]:
-        """What stands for an unknown: a length, or the cos and sin of an angle, and its value where that is carried."""
-        if not self.equations.is_angle[k]:
-            return [("z", k)]
-        return [("zc", k), ("zs", k), *([("z", k)] if self.is_carried(("z", k)) else [])]
 
     def state_operands(self) -> tuple[Operand, ...]:
-        """What stands for all unknowns."""
-        return tuple(operand for k in range(len(self.equations.is_angle)) for operand in self.unknown_operands(k))
+        """What stands for all unknowns: a length, or the cos and sin of an angle, and its value where it is carried."""
+        operands: list[Operand] = []
+        for k, is_angle in enumerate(self.equations.is_angle):
+            operands += [("zc", k), ("zs", k)] if is_angle else []
+            operands += [("z", k)] if not is_angle or ("z", k) in self.carried else []
+        return tuple(operands)
 
     def list_values(self, outputs: Sequence[ca.SX], written: int | None = None) -> list[int]:
         """The numbers, in `hoister.result`, of the values of expressions. Raises UnsupportedOperation.
@@ -274,6 +238,7 @@ class KernelInstructions:
             check_length(written + function.n_instructions())
         listing: InstructionList[Operand] = InstructionList()
         angles: dict[int, CosSin] = {}
+        are_angles = {"z": self.equations.is_angle, "u": self.equations.input_is_angle}
         arguments = []
         for name, symbol in self.symbols.items():
             numbers = [
@@ -281,12 +246,11 @@ class KernelInstructions:
                 for k in range(symbol.numel())
             ]
             arguments.append(numbers)
-            turned = self.equations.is_angle if name == "z" else self.equations.input_is_angle if name == "u" else ()
-            for k, is_angle in enumerate(turned):
+            for k, is_angle in enumerate(are_angles.get(name, ())):
                 if is_angle:
                     angles[numbers[k]] = CosSin(*(listing.add_input((name + part, k)) for part in "cs"))
-        wanted = [each for output in inline_function(listing, function, arguments) for each in output]
-        return self.hoister.rebuild(*expand_angle_sums(listing, wanted, angles))
+        (values,) = inline_function(listing, function, arguments)
+        return self.hoister.rebuild(*expand_angle_sums(listing, values, angles))
 
     def closed_form_operands(self, part: KernelBlock) -> list[Operand]:
         """What stands for the unknowns of a block in closed form, in the order of `closed_form_outputs`."""
@@ -310,27 +274,12 @@ class KernelInstructions:
             near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
         return [*(value for values in form.values for value in values), near]
 
-    def stop_outputs(self) -> list[ca.SX]:
-        """See `KernelEquations.stop_coalescences`."""
-        return [self.equations.stop_coalescences(self.symbols["stop"])]
-
     def point_coordinates(self, points: Sequence[int]) -> ca.SX:
         """x and y of some of the points."""
         q = self.symbols["q"]
-        positions = [self.equations.frame(self.links[k]).to_world(Vector(q[2 * k], q[2 * k + 1])) for k in points]
+        frames = self.equations.frames
+        positions = [frames[self.links[k]].to_world(Vector(q[2 * k], q[2 * k + 1])) for k in points]
         return ca.vertcat(ca.SX(0, 1), *(part for position in positions for part in position))
-
-    def newton_system(self, part: KernelBlock) -> list[ca.SX]:
-        """What a block leaves open, its Jacobian column after column, and the square of the shortest of these."""
-        e = self.equations.equations
-        jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-        return [e.F[part.block.rows], ca.vec(jacobian), _squared_arm(jacobian)]
-
-    def rate_systems(self) -> list[RateSystem]:
-        """See `KernelEquations.rate_systems`; where all rates are expressions there are none."""
-        if not (self.rates and self.solves_rates_apart):
-            return []
-        return self.equations.rate_systems(*(self.symbols[name] for name in ("z1", "z2", "u1", "u2")))
 
     def counted_angles(self) -> ca.SX:
         """Angles of links that wheels or racks tie: they may turn much farther in a step than the inputs do."""
@@ -338,11 +287,11 @@ class KernelInstructions:
         unknown = {column: k for k, column in enumerate(e.unknowns)}
         columns = [
             column
-            for column, each in enumerate(e.coordinates)
-            if each.owner in links and each.of_link and each.kind is MeasureKind.ANGLE
+            for column, coordinate in enumerate(e.coordinates)
+            if coordinate.owner in links and coordinate.of_link and coordinate.kind is MeasureKind.ANGLE
         ]
         # what nothing is made of but cos and sin is as fast as the block that it is in
-        counted = [e.w[k] for k in columns if k not in unknown or self.is_carried(("z", unknown[k]))]
+        counted = [e.w[k] for k in columns if k not in unknown or ("z", unknown[k]) in self.carried]
         return ca.vertcat(ca.SX(0, 1), *counted)
 
     def output_expressions(self) -> list[ca.SX]:
@@ -351,21 +300,20 @@ class KernelInstructions:
         positions = self.point_coordinates(range(len(self.links)))
         if not self.rates:
             return [positions]
-        symbols = s["z1"], s["z2"]
-        z1, z2 = symbols if self.solves_rates_apart else self.equations.rates(s["u1"], s["u2"])
-        y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
-        return [positions, *first_and_second_rates(positions, y, y1, y2)]
+        u1, u2 = s["u1"], s["u2"]
+        z1, z2 = (s["z1"], s["z2"]) if self.solves_rates_apart else self.equations.rates(u1, u2)
+        return [positions, *first_and_second_rates(positions, e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))]
 
 
 def operand_rows(operands: Sequence[Operand], values: np.ndarray) -> np.ndarray:
     """Cosines, sines and values of rows (rows, designs), as operands say."""
-    found = np.empty((len(operands), values.shape[1]))
-    for row, (part, k) in zip(found, operands, strict=True):
-        of = values[k]
+    rows = np.empty((len(operands), values.shape[1]))
+    for row, (part, k) in zip(rows, operands, strict=True):
+        value = values[k]
         # designs mostly start at one input
-        alike = of.size and of[0] == of[-1] and np.all(of == of[0])
-        row[:] = {"c": np.cos, "s": np.sin}.get(part[1:], np.positive)(of[:1] if alike else of)
-    return found
+        is_common = value.size and value[0] == value[-1] and np.all(value == value[0])
+        row[:] = {"c": np.cos, "s": np.sin}.get(part[1:], np.positive)(value[:1] if is_common else value)
+    return rows
 
 
 def unknowns_from_state(operands: Sequence[Operand], state: np.ndarray, count: int) -> np.ndarray:

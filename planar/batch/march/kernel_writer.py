@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from math import sqrt
-from typing import NamedTuple
 
 import casadi as ca
 
@@ -20,32 +19,6 @@ OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""
 LEAST_CANDIDATE_REGULARITY = 1e-3
 """Of a position that may stand as it is once it is known that there is no dead point before it."""
-
-
-class KernelStart(NamedTuple):
-    """What of the start is told: the signs of the blocks' assemblies in place of the state, where all of them are in
-    closed form; with these, whether all designs have the same inputs, which then stand in the table."""
-
-    has_signs: bool = False
-    has_common_inputs: bool = False
-
-
-STATE_GIVEN = KernelStart()
-
-
-class DesignsKernelLayout(NamedTuple):
-    """What the function takes and gives, row by row, each with an entry for every design.
-
-    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
-    rows that a step gives; table: numbers that a step takes.
-    """
-
-    state: tuple[Operand, ...]
-    inputs: tuple[Operand, ...]
-    output_row_count: int
-    ir: str
-    lanes: int
-    start: KernelStart
 
 
 class KernelWriter(KernelInstructions):
@@ -77,31 +50,28 @@ class KernelWriter(KernelInstructions):
 
     def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
         """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
-        written = self._write_instructions(self.list_values(outputs, self.ir.count), names)
-        check_length(self.ir.count)
-        return written
-
-    def write_separately(self, outputs: Sequence[ca.SX], have: Mapping[Operand, str]) -> list[list[str]]:
-        """The same, of each expression by itself."""
-        values = iter(self.write_values(outputs, have))
-        return [[next(values) for _ in range(each.numel())] for each in outputs]
-
-    def _write_instructions(self, wanted: Sequence[int], have: Mapping[Operand, str]) -> list[str]:
-        made, still = self.hoister.result, self.hoister.invariants
-        order = required_values(made, wanted)
-        names = {}
+        results = self.list_values(outputs, self.ir.count)
+        made, invariants = self.hoister.result, self.hoister.invariants
+        order = required_values(made, results)
+        written = {}
         for k in order:
             operand = made.instructions[k].key
             if operand is not None:
-                if operand not in have:
+                if operand not in names:
                     raise BareAngle(operand)
-                names[k] = have[operand]
-        ahead = [k for k in order if k in still and k not in self.hoisted_names]
+                written[k] = names[operand]
+        ahead = [k for k in order if k in invariants and k not in self.hoisted_names]
         with self.ir.hoisted():
-            self.ir.write_values(made, ahead, self.hoisted_names, names)
-        names |= {k: self.hoisted_names[k] for k in order if k in still}
-        self.ir.write_values(made, [k for k in order if k not in still], names, names)
-        return [names[k] for k in wanted]
+            self.ir.write_values(made, ahead, self.hoisted_names, written)
+        written |= {k: self.hoisted_names[k] for k in order if k in invariants}
+        self.ir.write_values(made, [k for k in order if k not in invariants], written, written)
+        check_length(self.ir.count)
+        return [written[k] for k in results]
+
+    def write_separately(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[list[str]]:
+        """The same, of each expression by itself."""
+        values = iter(self.write_values(outputs, names))
+        return [[next(values) for _ in range(output.numel())] for output in outputs]
 
     def write_closed_form(self, part: KernelBlock, names: OperandNames, as_cosine: bool = False) -> str:
         """A block in closed form: its unknowns put into `names`, and how near its two assemblies are, see
@@ -117,26 +87,9 @@ class KernelWriter(KernelInstructions):
 
     def write_stops(self, names: OperandNames) -> list[str]:
         """What reaches one where a pair meets its stop, of each pair with stops."""
-        return self.write_values(self.stop_outputs(), names) if self.equations.stop_pairs else []
-
-    def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
-        """The cos and sin of a sum of two angles."""
-        return write_angle_sum(self.ir, cos, sin, c, s)
-
-    def write_small_rotation(self, c: str, s: str, angle: str) -> tuple[str, str]:
-        """The cos and sin of an angle turned by a little."""
-        t = self.ir
-        square = t.binary("mul", angle, angle)
-        cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
-        sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
-        return self.write_normalised(*self.write_angle_sum(c, s, cos, sin))
-
-    def write_normalised(self, c: str, s: str) -> tuple[str, str]:
-        """What is nearly of length one, nearer to it: the inverse root by its first terms."""
-        t = self.ir
-        square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
-        return t.binary("mul", c, scale), t.binary("mul", s, scale)
+        if not self.equations.stop_pairs:
+            return []
+        return self.write_values([self.equations.stop_coalescences(self.symbols["stop"])], names)
 
     def write_apart_here(self, part: KernelBlock, near: str, names: OperandNames) -> str:
         """A flag: the two assemblies of a block are apart enough for a position, by its cosine or coalescence `near`,
@@ -147,20 +100,20 @@ class KernelWriter(KernelInstructions):
         """
         t, form = self.ir, part.closed_form
         assert form is not None
-        greatest = 0.99 * LEAST_KERNEL_REGULARITY**2
-        most = t.constant(1.0 - greatest)
+        margin = 0.99 * LEAST_KERNEL_REGULARITY**2
+        maximum = t.constant(1.0 - margin)
         if form.squared_arm is None:
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
-            least = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
-            (most,) = self.write_values([1.0 - ca.fmin(greatest, least)], names)
-        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), most)
+            arm_margin = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
+            (maximum,) = self.write_values([1.0 - ca.fmin(margin, arm_margin)], names)
+        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), maximum)
 
     def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:
         """Two flags: all steps before passed, and this one by its own flags too, which is kept."""
-        before = self.ir.load_flags(slot)
-        passed = reduce(self.ir.and_flags, flags, before)
+        previous = self.ir.load_flags(slot)
+        passed = reduce(self.ir.and_flags, flags, previous)
         self.ir.store_flags(passed, slot)
-        return before, passed
+        return previous, passed
 
     def write_circle_residuals(self, have: OperandNames) -> list[str]:
         """How far the square of every unknown angle's cos and sin is from one."""
@@ -182,10 +135,25 @@ def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[st
     )
 
 
-def result_pointers(t: IRWriter, lane: str, many: int, is_single: bool) -> list[str]:
+def write_normalised(t: IRWriter, c: str, s: str) -> tuple[str, str]:
+    """What is nearly of length one, nearer to it: the inverse root by its first terms."""
+    square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
+    scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
+    return t.binary("mul", c, scale), t.binary("mul", s, scale)
+
+
+def write_small_rotation(t: IRWriter, c: str, s: str, angle: str) -> tuple[str, str]:
+    """The cos and sin of an angle turned by a little."""
+    square = t.binary("mul", angle, angle)
+    cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
+    sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
+    return write_normalised(t, *write_angle_sum(t, c, s, cos, sin))
+
+
+def result_pointers(t: IRWriter, lane: str, row_count: int, is_single: bool) -> list[str]:
     """Where the rows of a step's results stand, for the designs from a lane on."""
     first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {lane}")
-    rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(many)]
+    rows = [t.add_instruction(f"add i64 {first}, {t.add_instruction(f'mul i64 %row, {k}')}") for k in range(row_count)]
     return [(t.single_pointer if is_single else t.double_pointer)("%out", row) for row in rows]
 
 
@@ -201,13 +169,13 @@ def write_closes(t: IRWriter, residuals: Sequence[str], tolerance: str) -> str:
 
     What is not a number stays so in sums, and is not below anything.
     """
-    nothing = t.constant(0.0)
-    total = t.add_all([t.call_intrinsic("fabs", each) for each in residuals if each != nothing] or [nothing])
+    zero = t.constant(0.0)
+    total = t.add_all([t.call_intrinsic("fabs", value) for value in residuals if value != zero] or [zero])
     return t.compare("ole", total, t.broadcast(tolerance))
 
 
 def write_keeps_apart(
-    t: IRWriter, earlier: str, before: str, here: str, is_known: str | None = None, is_cosine: bool = False
+    t: IRWriter, earlier: str, previous: str, current: str, is_known: str | None = None, is_cosine: bool = False
 ) -> str:
     """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence or
     by its cosine.
@@ -217,15 +185,15 @@ def write_keeps_apart(
     dead point. `is_known`: flags of whether there are three positions already.
     """
     maximum = 1.0 - LEAST_KERNEL_REGULARITY**2
-    change = t.binary("sub", t.binary("add", here, earlier), t.binary("add", before, before))
+    change = t.binary("sub", t.binary("add", current, earlier), t.binary("add", previous, previous))
     change = t.call_intrinsic("fabs", change)
     half = t.constant(0.5)
     if is_known is not None:
         half = t.select_or_zero(is_known, half)
     if is_cosine:
-        earlier, before, here = (t.call_intrinsic("fabs", value) for value in (earlier, before, here))
+        earlier, previous, current = (t.call_intrinsic("fabs", value) for value in (earlier, previous, current))
         maximum = sqrt(maximum)
-    greatest = t.greater(earlier, t.greater(before, here))  # what is not a number here stays so
+    greatest = t.greater(earlier, t.greater(previous, current))  # NaN in `current` stays
     reached = t.binary("add", greatest, t.binary("mul", change, half))
     return t.compare("ole", reached, t.constant(maximum))
 

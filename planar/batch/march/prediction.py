@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from math import comb
 from typing import TypeVar
 
@@ -27,13 +26,16 @@ CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
 
 
-@lru_cache
-def extrapolation_weights(order: int) -> tuple[float, ...]:
-    """Weights of the last values, the newest first, in the next: of the polynomial through so many of them.
+def prediction_weights(steps: int, order: int, first: int) -> Array:
+    """Weights of the last values, the newest first, in the next at every step (steps, order): of the polynomial through
+    those that are known, at step `first` one, before it none, and at most `order`.
 
     Of positions it is of one degree more than of the moves between as many of them.
     """
-    return tuple((-1.0) ** k * comb(order, k + 1) for k in range(order))
+    weights = np.zeros((steps, order))
+    for count in range(1, order + 1):
+        weights[first + count - 1 :, :count] = [(-1.0) ** k * comb(count, k + 1) for k in range(count)]
+    return weights
 
 
 def correction_limit(step: float) -> float:
@@ -48,7 +50,7 @@ def longest_step(offsets: Array) -> float:
 
 def correction_counts(steps: int, longest: float) -> Array:
     """How many of Newton's steps each step of a run takes (steps,), where inputs go so far in one at most."""
-    counts = np.full(steps, CORRECTIONS + sum(longest > each for each in COARSE_STEPS), dtype=np.int64)
+    counts = np.full(steps, CORRECTIONS + sum(longest > step for step in COARSE_STEPS), dtype=np.int64)
     counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
     return counts
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from math import ceil
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.march.checks import DesignFunctions, PointWriter, design_positions
+from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import (
     CorrectedAssemblies,
     DesignBatch,
@@ -20,18 +19,18 @@ from planar.batch.march.design_batch import (
 from planar.batch.march.designs_writer import (
     MARCH_ARGUMENTS,
     MARCH_FUNCTION,
+    DesignsKernelLayout,
     KernelRequest,
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelEquations, batch_equations, operand_rows, unknowns_from_state
-from planar.batch.march.kernel_writer import DesignsKernelLayout, KernelStart
 from planar.batch.march.prediction import (
     LONGEST_STEP,
     PREDICTOR_ORDER,
     correction_counts,
     correction_limit,
-    extrapolation_weights,
     longest_step,
+    prediction_weights,
 )
 from planar.codegen.llvm_compile import allocate_aligned, compile_function, is_aligned
 from planar.foundation.instruction_list import UnsupportedOperation
@@ -87,21 +86,22 @@ def run_designs(batch: DesignBatch, out: Array, candidates: Array | None = None)
         attempts.append((partial(run_compiled, extra_corrections=EXTRA_CORRECTIONS), step_count))
     if batch.results is None:
         attempts.append((_run_start, 1))
-    for run, wanted in attempts:
-        left = np.flatnonzero(good < wanted)
-        if runs:  # what has nowhere to start is given once
-            left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
-        if not left.size:
+    for run, target in attempts:
+        designs = np.flatnonzero(good < target)
+        if runs:  # designs that have nowhere to start are tried once
+            starts = np.concatenate([batch.z0[:, designs], batch.u0[:, designs]])
+            designs = designs[np.isfinite(starts).all(axis=0)]
+        if not designs.size:
             continue
         try:
-            if left.size == len(good):
+            if designs.size == len(good):
                 good = run(batch, out, candidates)
             else:
-                own = allocate_aligned(out.shape[0], out.shape[1], left.size, out.dtype)
-                good[left] = run(batch.select(left), own, None)
-                out[:, :, left] = own
+                part = allocate_aligned(out.shape[0], out.shape[1], designs.size, out.dtype)
+                good[designs] = run(batch.select(designs), part, None)
+                out[:, :, designs] = part
                 if candidates is not None:
-                    candidates[left] = good[left]
+                    candidates[designs] = good[designs]
         except UnsupportedOperation:
             continue
         runs += 1
@@ -112,36 +112,26 @@ def run_designs(batch: DesignBatch, out: Array, candidates: Array | None = None)
 
 def _run_start(batch: DesignBatch, out: Array, candidates: Array | None) -> Array:
     """The first position alone, of designs of any structure."""
-    functions = DesignFunctions(batch.functions, batch.p)
+    evaluation = DesignEvaluation(batch)
     with np.errstate(all="ignore"):
-        row = design_positions(functions, batch, functions.correct(_columns(batch.z0), batch.u0.T), batch.u0)
-        good: Array = (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+        positions = evaluation.positions(evaluation.correct(batch.z0.T, batch.u0.T), batch.u0)
+        good: Array = (evaluation.write_points(out[0], positions) & evaluation.accepts(positions)).astype(int)
     erase_from_steps(out, good)
     if candidates is not None:
         candidates[:] = good
     return good
 
 
-def _columns(rows: Array) -> Array:
-    return np.ascontiguousarray(rows.T)
-
-
-class _Division(NamedTuple):
-    """Steps that are divided into so many parts each, and where the inputs are (parts + 1, inputs)."""
-
-    part_count: int
-    input_offsets: Array
-
-
-def _divide_steps(offsets: Array) -> _Division:
-    """Steps as they are, or divided where they do not show what lies between, by offsets (steps + 1, inputs)."""
+def _divide_steps(offsets: Array) -> tuple[int, Array]:
+    """Into how many parts steps are divided where they do not show what lies between, by offsets (steps + 1, inputs),
+    and the offsets of these (parts + 1, inputs)."""
     steps, longest = len(offsets), longest_step(offsets)
     count = ceil(longest / REFINED_STEP) if longest > LONGEST_STEP or steps == 2 else 1
     count = max(count, 2) if steps == 2 else count
     if count == 1:
-        return _Division(1, offsets)
+        return 1, offsets
     knots = np.arange(count * (steps - 1) + 1) / count
-    return _Division(count, np.array([np.interp(knots, np.arange(steps), each) for each in offsets.T]).T)
+    return count, np.array([np.interp(knots, np.arange(steps), column) for column in offsets.T]).T
 
 
 def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None, extra_corrections: int = 0) -> Array:
@@ -151,10 +141,11 @@ def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None
         return _run_steps(batch, out, candidates, extra_corrections)
     good = np.empty(out.shape[2], dtype=int)
     batch = batch._replace(input_offsets=offsets)
-    for some in split_into_blocks(len(good), max(LANES, MAX_DIVIDED_NUMBERS // (len(offsets) * out.shape[1] + 1))):
-        own = allocate_aligned(len(offsets), out.shape[1], some.stop - some.start)
-        good[some] = _run_steps(batch.select(some), own, None, extra_corrections)
-        out[:, :, some] = own[::parts]
+    size = max(LANES, MAX_DIVIDED_NUMBERS // (len(offsets) * out.shape[1] + 1))
+    for designs in split_into_blocks(len(good), size):
+        divided = allocate_aligned(len(offsets), out.shape[1], designs.stop - designs.start)
+        good[designs] = _run_steps(batch.select(designs), divided, None, extra_corrections)
+        out[:, :, designs] = divided[::parts]
     good = np.where(good > 0, (good - 1) // parts + 1, 0)
     erase_from_steps(out, good)
     if candidates is not None:
@@ -166,17 +157,18 @@ def _run_steps(batch: DesignBatch, out: Array, candidates: Array | None, extra_c
     """As `run_compiled`, of steps that are short enough."""
     equations = batch_equations(batch)
     signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
-    start = KernelStart(signs is not None, signs is not None and common is not None)
+    has_signs, has_common_inputs = signs is not None, signs is not None and common is not None
     counts = candidates is not None and not equations.has_newton_blocks
-    request = KernelRequest(equations, tuple(batch.links), batch.rates, LANES, start=start, results=batch.results)
+    request = KernelRequest(equations, tuple(batch.links), batch.rates, LANES, results=batch.results)
+    request = request._replace(has_signs=has_signs, has_common_inputs=has_common_inputs)
     kernel = designs_kernel(request._replace(is_single=out.dtype == np.float32, counts_candidates=counts))
-    table, corrections = step_table(batch.input_offsets, common if kernel.start.has_common_inputs else None)
+    table, corrections = step_table(batch.input_offsets, common if kernel.request.has_common_inputs else None)
     tolerances = batch.tolerance, correction_limit(longest_step(batch.input_offsets)), batch.unit
-    _, good, found = _run_kernel(
-        kernel, batch._replace(signs=signs), batch.rates, (table, corrections + extra_corrections), tolerances, out
+    _, good, candidate_counts = _run_kernel(
+        kernel, batch._replace(signs=signs), (table, corrections + extra_corrections), tolerances, out
     )
-    written = found if counts else good.copy()
-    # what is told of a step only at the next one condemns the step too
+    written = candidate_counts if counts else good.copy()
+    # a failure that shows only at the next step condemns the step too
     good -= (good > 1) & (good < len(table))
     if candidates is None:
         erase_between(out, good, written)
@@ -190,9 +182,8 @@ def last_good_unknowns(batch: DesignBatch, good: Array) -> Array:
     try:
         return unknowns_at_steps(batch, np.maximum(good - 1, 0))
     except UnsupportedOperation:  # none has gone beyond its start
-        functions = DesignFunctions(batch.functions, batch.p)
         with np.errstate(all="ignore"):
-            return functions.correct(_columns(batch.z0), batch.u0.T).T
+            return DesignEvaluation(batch).correct(batch.z0.T, batch.u0.T).T
 
 
 def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
@@ -202,8 +193,8 @@ def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
     kernel = designs_kernel(KernelRequest(batch_equations(batch), (), False, LANES, ()))
     table, counts = step_table(offsets)
     tolerances = batch.tolerance, correction_limit(longest_step(offsets)), 1.0
-    found = _run_kernel(kernel, batch, False, (table, counts + EXTRA_CORRECTIONS), tolerances, None)[0]
-    rows = found[parts * steps, : len(kernel.state), np.arange(len(steps))].T
+    out, _, _ = _run_kernel(kernel, batch, (table, counts + EXTRA_CORRECTIONS), tolerances, None)
+    rows = out[parts * steps, : len(kernel.state), np.arange(len(steps))].T
     return unknowns_from_state(kernel.state, rows, len(batch.z0))
 
 
@@ -214,13 +205,13 @@ def lead_designs(batch: DesignBatch, index: int, span: Array, step: float) -> tu
     """
     z, passed = batch.z0.copy(), np.zeros(len(span), dtype=bool)
     for length in np.unique(span[np.isfinite(span)]):
-        some = np.flatnonzero(span == length)
+        designs = np.flatnonzero(span == length)
         offsets = np.zeros((ceil(abs(length) / step) + 2, len(batch.u0)))
         offsets[:, index] = np.linspace(0.0, length, len(offsets))
-        own = batch.select(some)._replace(input_offsets=offsets, links=(), q=batch.q[:0, some], rates=False)
-        good = run_designs(own, allocate_aligned(len(offsets), 0, len(some)))
-        passed[some] = good == len(offsets)
-        z[:, some] = last_good_unknowns(own, good)
+        part = batch.select(designs)._replace(input_offsets=offsets, links=(), q=batch.q[:0, designs], rates=False)
+        good = run_designs(part, allocate_aligned(len(offsets), 0, len(designs)))
+        passed[designs] = good == len(offsets)
+        z[:, designs] = last_good_unknowns(part, good)
     return z, passed
 
 
@@ -231,7 +222,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     )
     table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
-    out, good, _ = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
+    out, good, _ = _run_kernel(kernel, batch, (table, counts), (batch.tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(batch.links)
     z = unknowns_from_state(kernel.state, rows[2 * places : -1], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
@@ -258,73 +249,55 @@ def _common_inputs(u0: Array) -> Array | None:
     first = u0[:, 0]
     if (u0 == first[:, None]).all():
         return first
-    least, most = (np.array([of(row) for row in u0]) for of in (np.fmin.reduce, np.fmax.reduce))
-    return least if np.array_equal(least, most) else None
+    lowest, highest = np.fmin.reduce(u0, axis=1), np.fmax.reduce(u0, axis=1)
+    return lowest if np.array_equal(lowest, highest) else None
 
 
 def _run_kernel(
     kernel: DesignsKernelLayout,
     batch: DesignBatch,
-    rates: bool,
     tables: tuple[Array, Array],
     tolerances: tuple[float, float, float],
     out: Array | None,
 ) -> tuple[Array, Array, Array]:
-    """What the kernel gives: out, good, candidates."""
-    function = compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS)
-    many, steps, lanes = batch.p.shape[1], len(tables[0]), kernel.lanes
+    """The results of a kernel: out, good, candidates."""
+    request, (table, counts) = kernel.request, tables
+    design_count, step_count, lanes = batch.p.shape[1], len(table), request.lanes
+    function, no_rows = compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS), np.zeros((0, design_count))
     rows = (
         batch.numbers,
         batch.q,
-        batch.signs if kernel.start.has_signs and batch.signs is not None else operand_rows(kernel.state, batch.z0),
-        operand_rows(kernel.inputs, batch.u0) if not kernel.start.has_common_inputs else np.zeros((0, many)),
-        np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
+        batch.signs if request.has_signs and batch.signs is not None else operand_rows(kernel.state, batch.z0),
+        no_rows if request.has_common_inputs else operand_rows(kernel.inputs, batch.u0),
+        np.concatenate([batch.u1, batch.u2]) if request.rates else no_rows,
     )
-    given = out
+
+    def call(rows: Sequence[Array], design_count: int, out: Array, counted: Array) -> None:
+        arrays = [np.ascontiguousarray(row) for row in (*rows, table, counts)]
+        row_stride, step_stride = out.strides[1] // out.itemsize, out.strides[0] // out.itemsize
+        sizes = design_count // lanes, step_count, rows[0].shape[1], row_stride, step_stride
+        addresses = [array.ctypes.data for array in (*arrays, out, *counted)]
+        with leave_turn(design_count * step_count >= LONG_CALL_POSITIONS):
+            function(*sizes, *addresses[: len(arrays)], *tolerances, *addresses[len(arrays) :])
+
+    target = out
     dtype = np.dtype(np.float64) if out is None else out.dtype
     if out is None or not is_aligned(out):
-        out = allocate_aligned(steps, kernel.output_row_count, many, dtype)
-    counted = np.zeros((2, -(-many // lanes) * lanes))
-    whole = many // lanes * lanes
-    if whole:
-        _call_function(function, kernel, rows, whole, tables, tolerances, out, counted)
-    if whole < many:
+        out = allocate_aligned(step_count, kernel.output_row_count, design_count, dtype)
+    counted = np.zeros((2, -(-design_count // lanes) * lanes))
+    in_full_blocks = design_count // lanes * lanes
+    if in_full_blocks:
+        call(rows, in_full_blocks, out, counted)
+    if in_full_blocks < design_count:
         # those that do not fill the lanes, with copies of the last beside them
-        which = np.minimum(np.arange(whole, whole + lanes), many - 1)
-        last = allocate_aligned(steps, kernel.output_row_count, lanes, dtype)
-        own = [row[:, which] for row in rows]
-        _call_function(function, kernel, own, lanes, tables, tolerances, last, counted[:, whole:])
-        out[:, :, whole:] = last[:, :, : many - whole]
-    if given is not None and given is not out:
-        given[...] = out
-    good, candidates = counted[:, :many].astype(int)
+        columns = np.minimum(np.arange(in_full_blocks, in_full_blocks + lanes), design_count - 1)
+        last_block = allocate_aligned(step_count, kernel.output_row_count, lanes, dtype)
+        call([row[:, columns] for row in rows], lanes, last_block, counted[:, in_full_blocks:])
+        out[:, :, in_full_blocks:] = last_block[:, :, : design_count - in_full_blocks]
+    if target is not None and target is not out:
+        target[...] = out
+    good, candidates = counted[:, :design_count].astype(int)
     return out, good, candidates
-
-
-def _call_function(
-    function: Any,
-    kernel: DesignsKernelLayout,
-    rows: Sequence[Array],
-    design_count: int,
-    tables: tuple[Array, Array],
-    tolerances: tuple[float, float, float],
-    out: Array,
-    counted: Array,
-) -> None:
-    arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
-    width = rows[0].shape[1]
-    strides = (out.strides[1] // out.itemsize, out.strides[0] // out.itemsize)
-    with leave_turn(design_count * len(tables[0]) >= LONG_CALL_POSITIONS):
-        function(
-            design_count // kernel.lanes,
-            len(tables[0]),
-            width,
-            *strides,
-            *(each.ctypes.data for each in arrays),
-            *tolerances,
-            out.ctypes.data,
-            *(each.ctypes.data for each in counted),
-        )
 
 
 def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:
@@ -341,10 +314,8 @@ def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
     steps, inputs = shape
     offsets = np.frombuffer(content).reshape(shape)
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
-    for step in range(min(steps, PREDICTOR_ORDER)):
-        # ahead of the first there is its start
-        table[step, : max(step, 1)] = extrapolation_weights(max(step, 1))
-    table[PREDICTOR_ORDER:, :PREDICTOR_ORDER] = extrapolation_weights(PREDICTOR_ORDER)
+    table[:, :PREDICTOR_ORDER] = prediction_weights(steps, PREDICTOR_ORDER, 1)
+    table[:1, 0] = 1.0  # ahead of the first step there is its start
     for k in range(inputs):
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1

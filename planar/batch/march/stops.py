@@ -46,7 +46,7 @@ class StopLimits(NamedTuple):
 
     def select(self, designs: Array | slice) -> StopLimits:
         """Those of some of the designs."""
-        rows = (each[..., designs] for each in (self.low, self.high, self.numbers, self.input_low, self.input_high))
+        rows = (values[..., designs] for values in (self.low, self.high, self.numbers, self.input_low, self.input_high))
         return StopLimits(self.pairs, self.is_periodic, *rows)
 
     def cleared(self) -> StopLimits:
@@ -81,11 +81,11 @@ class StopLimits(NamedTuple):
         wide = self._periodic_rows & (self.high - self.low > WIDE_RANGE)
         low, high = np.mod(positions - self.low, TURN), np.mod(self.high - positions, TURN)
         numbers = self.numbers.copy()
-        for at, sense, own in ((self.low, 1.0, low <= high), (self.high, -1.0, high < low)):
-            here = wide & own & (np.minimum(low, high) < NEAR_ANGLE)
-            sine = [-sense * np.sin(at), sense * np.cos(at), np.zeros_like(at)]
+        for stop, sense, is_nearer in ((self.low, 1.0, low <= high), (self.high, -1.0, high < low)):
+            replaced = wide & is_nearer & (np.minimum(low, high) < NEAR_ANGLE)
+            sine = [-sense * np.sin(stop), sense * np.cos(stop), np.zeros_like(stop)]
             for k, value in enumerate(sine):
-                numbers[k::NUMBERS_PER_STOP][here] = value[here]
+                numbers[k::NUMBERS_PER_STOP][replaced] = value[replaced]
         return self._replace(numbers=numbers)
 
     def turns_between(self, positions: Array) -> Array:
@@ -104,8 +104,9 @@ class StopLimits(NamedTuple):
         columns = np.arange(positions.shape[1])
         low, high = (self._offsets(positions, sense)[stop, columns] for sense in (1.0, -1.0))
         periodic = np.array(self.is_periodic, dtype=bool)[stop]
-        off = [np.where(periodic, np.remainder(each + np.pi, TURN) - np.pi, each) for each in (low, high)]
-        return np.asarray(np.minimum(*np.abs(off)) < SURE_DISTANCE)
+        offsets = np.stack([low, high])
+        offsets = np.where(periodic, np.remainder(offsets + np.pi, TURN) - np.pi, offsets)
+        return np.asarray(np.abs(offsets).min(axis=0) < SURE_DISTANCE)
 
 
 def _nearer_room(low: Array, high: Array) -> Array:
@@ -125,27 +126,27 @@ def stop_limits(
             row, middle, half = NUMBERS_PER_STOP * k, 0.5 * (low[k] + high[k]), 0.5 * (high[k] - low[k])
             if periodic:
                 scale = 1.0 / (1.0 - np.cos(half))
-                own = [scale * np.cos(middle), scale * np.sin(middle), -scale * np.cos(half), np.zeros_like(half)]
+                values = [scale * np.cos(middle), scale * np.sin(middle), -scale * np.cos(half), np.zeros_like(half)]
             else:
                 scale = np.where(np.isfinite(half), 1.0 / half**2, 1.0)
                 is_upper = np.isinf(low[k])
-                own = [
+                values = [
                     np.where(is_upper, -1.0, scale),
                     np.where(is_upper, high[k], -scale * low[k]),
                     np.where(np.isfinite(half), high[k], 1.0),
                     np.where(np.isfinite(half), -1.0, 0.0),
                 ]
-            numbers[row : row + NUMBERS_PER_STOP] = own
+            numbers[row : row + NUMBERS_PER_STOP] = values
     return StopLimits(tuple(pairs), tuple(is_periodic), low, high, numbers, *inputs)
 
 
-def stop_rooms(values: Sequence[Any], is_periodic: Sequence[bool], numbers: Sequence[Any], of: Any) -> list[Any]:
-    """The rooms of pairs at these values, in numbers or symbols; `of` has cos and sin."""
-    found = []
+def stop_rooms(values: Sequence[Any], is_periodic: Sequence[bool], numbers: Sequence[Any], functions: Any) -> list[Any]:
+    """The rooms of pairs at these values, in numbers or symbols; `functions` has cos and sin."""
+    rooms = []
     for k, (x, periodic) in enumerate(zip(values, is_periodic, strict=True)):
         a, b, c, d = numbers[NUMBERS_PER_STOP * k : NUMBERS_PER_STOP * (k + 1)]
-        found.append(a * of.cos(x) + b * of.sin(x) + c if periodic else (a * x + b) * (c + d * x))
-    return found
+        rooms.append(a * functions.cos(x) + b * functions.sin(x) + c if periodic else (a * x + b) * (c + d * x))
+    return rooms
 
 
 def are_periodic(pairs: Sequence[Pair], mechanism: Mechanism) -> tuple[bool, ...]:

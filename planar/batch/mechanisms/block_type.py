@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cached_property, lru_cache, partial
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 
+from planar.batch.march.kernel import closing_errors
 from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
 from planar.codegen.tape import BlockFormula, FormulaInput
 from planar.equations.closed_form import ClosedForm, find_closed_form
@@ -17,10 +18,9 @@ from planar.equations.coordinates import coordinate_columns, frames_from_coordin
 from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
-from planar.equations.residuals import closing_error, input_residuals, pair_residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
-from planar.foundation.geometry import GROUND, Frame, frame_at
-from planar.foundation.instruction_list import InstructionList, UnsupportedOperation, required_values
+from planar.foundation.geometry import GROUND, frame_at
+from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.link_shapes import Link
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind as Measure
@@ -154,7 +154,7 @@ class BlockType:
             sign_numbers = [work.instructions.add_constant(sign) for sign in signs]
             assembly = work.closed_form_assembly(sign_numbers)
             poses = work.poses(assembly)
-            residual, clear = work.acceptance_values(assembly, work.residuals(assembly, poses))
+            residual, clear = work.acceptance_values(assembly, poses)
             outputs = [*(number for pose in poses for number in pose), *sign_numbers, residual]
             modes.append(_StartMode(outputs, work.sketch_distance(poses, sums), residual, clear))
         *outputs, residual, nearest, second, least_clear = work.nearest_mode(modes)
@@ -174,8 +174,7 @@ class BlockType:
             signs = [work.add_input("p", self.number_count + k) for k in range(self.sign_count)]
             assembly = work.closed_form_assembly(signs, polished)
             poses = work.poses(assembly)
-            acceptance = work.acceptance_values(assembly, work.residuals(assembly, poses))
-            outputs = [*work.link_rows(assembly, poses, rates), *acceptance]
+            outputs = [*work.link_rows(assembly, poses, rates), *work.acceptance_values(assembly, poses)]
             self._run_formulas[rates, polished] = work.make_formula(outputs)
         return self._run_formulas[rates, polished]
 
@@ -223,6 +222,26 @@ class SymbolicAssembly(NamedTuple):
     coalescences: list[int]
 
 
+Value = TypeVar("Value", int, str)
+
+
+def rotate(
+    add: Callable[[str, Value, Value], Value], constant: Callable[[float], Value], c: Value, s: Value, angle: Value
+) -> tuple[Value, Value]:
+    """The cos and sin of an angle moved on by another one: by the rational rotation, the same to third order.
+
+    `add` writes an operation, and `constant` a number.
+    """
+    half = add("mul", constant(0.5), angle)
+    square = add("mul", half, half)
+    scale = add("div", constant(1.0), add("add", constant(1.0), square))
+    cos, sin = add("mul", add("sub", constant(1.0), square), scale), add("mul", angle, scale)
+    return (
+        add("sub", add("mul", c, cos), add("mul", s, sin)),
+        add("add", add("mul", s, cos), add("mul", c, sin)),
+    )
+
+
 class _StartMode(NamedTuple):
     """Values of one assembly mode by their numbers: its outputs, its squared distance to the sketch, its residual, and
     its distance measure from a dead point."""
@@ -256,6 +275,11 @@ class FormulaBuilder:
                 for k in range(e.u.numel())]  # fmt: skip
         self.u1 = [self.add_input("row", slot, first) for slot, first, _ in rows]
         self.u2 = [self.add_input("row", slot, second) for slot, _, second in rows]
+        pairs = {pair.name: pair for pair in block_type.mechanism.pairs}
+        self.inner_frames, self.pair_coordinates = frames_from_coordinates(
+            ca.vertsplit(e.w), coordinate_columns(e.coordinates), block_type.inner_links, pairs
+        )
+        "of the inner links, and of pairs by name, in the unknowns"
 
     def add_input(self, source: str, place: int, part: int = 0) -> int:
         """Add an input; "angle" and "unknown" are represented by their cos and sin."""
@@ -265,27 +289,23 @@ class FormulaBuilder:
         """Add a new value, represented by its cos and sin, or by its parts."""
         return self.add_input("unknown", len(self.instructions.instructions))
 
-    def _inline(
-        self, of: Sequence[ca.SX], outputs: list[ca.SX], z: list[int], more: Sequence[list[int]] = ()
-    ) -> list[int]:
-        """The values of expressions in z, u, p, u1, u2 and further symbols."""
+    def _inline(self, outputs: list[ca.SX], z: list[int], further: Sequence[tuple[ca.SX, list[int]]] = ()) -> list[int]:
+        """The values of expressions in z, u, p, u1, u2 and further symbols, each with its numbers."""
         column = ca.densify(ca.vertcat(*outputs))
-        function = ca.Function("part", [self.equations.z, *self.symbols, *of], [column], {"cse": True})
-        arguments = [z, self.u, self.p, self.u1, self.u2, *more]
-        return inline_function(self.instructions, function, arguments)[0]
+        symbols, numbers = [symbol for symbol, _ in further], [values for _, values in further]
+        function = ca.Function("part", [self.equations.z, *self.symbols, *symbols], [column], {"cse": True})
+        return inline_function(self.instructions, function, [z, self.u, self.p, self.u1, self.u2, *numbers])[0]
 
     def closed_form_assembly(self, signs: Sequence[int], polished: bool = False) -> SymbolicAssembly:
         """The unknowns, group after group, by their closed forms; polished by a step of Newton's method."""
         e, first = self.equations, len(self.instructions.instructions)
         z = [self.add_input("unknown", first, k) for k in range(e.z.numel())]
-        cos_sin, coalescences, rest = {}, [], iter(signs)
+        cos_sin, coalescences, unused_signs = {}, [], iter(signs)
         for stage, form in zip(self.block_type.blocks, self.block_type.closed_forms, strict=True):
             assert form is not None
-            flat = [*(part for value in form.values for part in value), form.coalescence]
-            if isinstance(form, ClosedForm):
-                values = iter(self._inline([form.sign], flat, z, [[next(rest)]]))
-            else:
-                values = iter(self._inline((), flat, z))
+            outputs = [*(part for value in form.values for part in value), form.coalescence]
+            sign = [(form.sign, [next(unused_signs)])] if isinstance(form, ClosedForm) else []
+            values = iter(self._inline(outputs, z, sign))
             columns = range(stage.unknowns.start, stage.unknowns.stop)
             parts = {k: [next(values) for _ in value] for k, value in zip(columns, form.values, strict=True)}
             coalescences.append(next(values))
@@ -309,21 +329,29 @@ class FormulaBuilder:
         if rates is None:
             step, square, *lengths = solve_with_volume(ca.densify(ca.jacobian(e.F, e.z)), e.F)
             strength = square / lengths[0] if lengths else square
-            return self.make_formula(self._inline((), [step, strength], z))
+            return self.make_formula(self._inline([step, strength], z))
         assembly = SymbolicAssembly(z, cos_sin, [])
         poses = self.poses(assembly)
-        residual, _ = self.acceptance_values(assembly, self.residuals(assembly, poses))
+        residual, _ = self.acceptance_values(assembly, poses)
         return self.make_formula([*self.link_rows(assembly, poses, rates), residual])
 
     def link_rows(self, assembly: SymbolicAssembly, poses: list[list[int]], rates: bool) -> list[int]:
-        """The rows of the inner links: their poses, each followed by its rates if they are wanted."""
-        if rates:
-            poses = [pose + rows for pose, rows in zip(poses, self.rates(assembly), strict=True)]
-        return [number for pose in poses for number in pose]
+        """The rows of the inner links: their poses, each followed by its rates if they are wanted: x', y', angle', then
+        the second ones."""
+        if not rates:
+            return [number for pose in poses for number in pose]
+        e, (u1, u2), count = self.equations, self.symbols[2:], 3 * len(poses)
+        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
+        w1, w2 = first_and_second_rates(e.w[:count], e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
+        values = self._inline([w1, w2], assembly.z)
+        rows: list[int] = []
+        for k, pose in enumerate(poses):
+            rows += [*pose, *values[3 * k : 3 * k + 3], *values[count + 3 * k : count + 3 * k + 3]]
+        return rows
 
     def _polish(self, stage: Block, z: list[int], parts: dict[int, list[int]]) -> dict[int, list[int]]:
         """The unknowns of a group after a step of Newton's method, angles rotated by the rational rotation."""
-        e, add, one = self.equations, self.instructions.add, self.instructions.add_constant(1.0)
+        e, add = self.equations, self.instructions.add
         near = list(z)
         for k, value in parts.items():
             if len(value) == 2:
@@ -334,74 +362,49 @@ class FormulaBuilder:
                 self.cos_sin[near[k]] = CosSin(*parts[k])
             else:
                 near[k] = value[0]
-        slope = block_jacobian(e, stage.rows, stage.unknowns)
-        step = self._inline((), [solve_by_determinants(slope, e.F[stage.rows])], near)
-        polished = {}
-        for (k, value), back in zip(parts.items(), step, strict=True):
-            if len(value) == 1:
-                polished[k] = [add("sub", value[0], back)]
-                continue
-            c, s = value
-            half = add("mul", self.instructions.add_constant(-0.5), back)
-            square = add("mul", half, half)
-            scale = add("div", one, add("add", one, square))
-            cos, sin = add("mul", add("sub", one, square), scale), add("mul", add("add", half, half), scale)
-            polished[k] = [
-                add("sub", add("mul", c, cos), add("mul", s, sin)),
-                add("add", add("mul", s, cos), add("mul", c, sin)),
-            ]
-        return polished
-
-    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple[ca.SX, ...]]]:
-        """Frames of the inner links and coordinates of the pairs, in the unknowns."""
-        e, kind = self.equations, self.block_type
-        column = coordinate_columns(e.coordinates)
-        return frames_from_coordinates(
-            ca.vertsplit(e.w), column, kind.inner_links, {pair.name: pair for pair in kind.mechanism.pairs}
-        )
+        jacobian = block_jacobian(e, stage.rows, stage.unknowns)
+        steps = self._inline([solve_by_determinants(jacobian, e.F[stage.rows])], near)
+        return {
+            k: [add("sub", value[0], step)]
+            if len(value) == 1
+            else [*rotate(add, self.instructions.add_constant, value[0], value[1], add("neg", step))]
+            for (k, value), step in zip(parts.items(), steps, strict=True)
+        }
 
     def poses(self, assembly: SymbolicAssembly) -> list[list[int]]:
         """x, y, cos and sin of every inner link."""
-        frames, _ = self._inner_frames()
-        parts = [part for name in self.block_type.inner_links for part in frames[name][:4]]
-        values = self._inline((), [ca.SX(part) for part in parts], assembly.z)
-        return [values[4 * k : 4 * k + 4] for k in range(len(self.block_type.inner_links))]
+        parts = [ca.SX(part) for frame in self.inner_frames.values() for part in frame[:POSE_ROWS]]
+        values = self._inline(parts, assembly.z)
+        return [values[first : first + POSE_ROWS] for first in range(0, len(values), POSE_ROWS)]
 
-    def residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
+    def _residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
         """The residual of every constraint by the formulas of the pairs, independent of the elimination.
 
         Of an angle that closes modulo a turn |sin| + 1 - cos; of cos and sin of an unknown, how far from the circle.
         """
         e, kind = self.equations, self.block_type
         places = ca.SX.sym("places", 3 * len(kind.inner_links))
-        poses_given: list[int] = []
+        place_numbers: list[int] = []
         for x, y, c, s in poses:
-            poses_given += [x, y, self.add_unknown()]
-            self.cos_sin[poses_given[-1]] = CosSin(c, s)
+            place_numbers += [x, y, self.add_unknown()]
+            self.cos_sin[place_numbers[-1]] = CosSin(c, s)
+        first_input = 3 * len(kind.given_links)
+        split = [*ca.vertsplit(e.u)[:first_input], *ca.vertsplit(places)]
         names = (*kind.given_links, *kind.inner_links)
-        split = [*ca.vertsplit(e.u)[: 3 * len(kind.given_links)], *ca.vertsplit(places)]
         frames = {name: frame_at(*split[3 * k : 3 * k + 3]) for k, name in enumerate(names)} | {"frame": GROUND}
-        _, coordinates = self._inner_frames()
-        pairs = kind.mechanism.pairs
-        numbers = split_pair_numbers(pairs, e.p)
-        driven = [pair for pair, joint in zip(pairs, kind.signature.pairs, strict=True) if joint.driven]
-        rows = [
-            *pair_residuals(pairs, frames, numbers, coordinates),
-            *input_residuals(driven, frames, numbers, coordinates, scalars(e.u)[3 * len(kind.given_links) :]),
-        ]
-        errors = [closing_error(value, row.kind) for row, value in rows]
-        values = self._inline((places,), [ca.SX(error) for error in errors], assembly.z, (poses_given,))
+        errors = closing_errors(e, kind.mechanism, frames, self.pair_coordinates, first_input)
+        values = self._inline([errors], assembly.z, [(places, place_numbers)])
         add = self.instructions.add
         for c, s in assembly.cos_sin.values():
             square = add("add", add("mul", c, c), add("mul", s, s))
             values.append(add("sub", square, self.instructions.add_constant(1.0)))
         return values
 
-    def acceptance_values(self, assembly: SymbolicAssembly, residuals: list[int]) -> list[int]:
+    def acceptance_values(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
         """The largest residual, and the least distance measure from a dead point."""
         add = self.instructions.add
         largest = total = self.instructions.add_constant(0.0)
-        for residual in residuals:
+        for residual in self._residuals(assembly, poses):
             size = add("abs", residual)
             largest, total = add("maxnum", largest, size), add("add", total, size)
         # NaN stays in a sum, but not in the largest
@@ -411,17 +414,6 @@ class FormulaBuilder:
             distance = add("sub", self.instructions.add_constant(1.0), coalescence)
             clear = add("minnum", clear, distance) if k else distance
         return [largest, clear]
-
-    def rates(self, assembly: SymbolicAssembly) -> list[list[int]]:
-        """x', y', angle', then the second ones of every inner link."""
-        e, (u1, u2) = self.equations, self.symbols[2:]
-        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
-        y, y1, y2 = e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2)
-        w = e.w[: 3 * len(self.block_type.inner_links)]
-        both = ca.vertcat(*first_and_second_rates(w, y, y1, y2))
-        values = self._inline((), [both], assembly.z)
-        count = 3 * len(self.block_type.inner_links)
-        return [values[3 * k : 3 * k + 3] + values[count + 3 * k : count + 3 * k + 3] for k in range(count // 3)]
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
         """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
@@ -463,17 +455,11 @@ class FormulaBuilder:
     def make_formula(self, wanted: list[int]) -> BlockFormula:
         """The formula of wanted values. Raises UnsupportedOperation where an angle stands outside cos and sin, or it is
         long."""
-        made, numbers = expand_angle_sums(self.instructions, wanted, self.cos_sin)
-        leaves: dict[int, FormulaInput] = {}
-        order = required_values(made, numbers)
-        check_length(len(order))
-        for number in order:
-            key = made.instructions[number].key
-            if key is not None:
-                if key.source in ("angle", "unknown"):
-                    raise UnsupportedOperation("an angle stands outside cos and sin")
-                leaves[number] = key
-        return BlockFormula(made, tuple(numbers), leaves)
+        formula = BlockFormula(*expand_angle_sums(self.instructions, wanted, self.cos_sin))
+        check_length(len(formula.order))
+        if any(leaf.source in ("angle", "unknown") for leaf in formula.inputs.values()):
+            raise UnsupportedOperation("an angle stands outside cos and sin")
+        return formula
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)
@@ -492,9 +478,8 @@ def write_formula(inputs: Sequence[Sequence[FormulaInput]], write: Callable[...,
     listing: InstructionList[FormulaInput] = InstructionList()
     symbols = [ca.SX.sym(f"of{k}", len(group)) for k, group in enumerate(inputs)]
     function = ca.Function("written", symbols, [ca.densify(ca.vertcat(*write(*symbols)))], {"cse": True})
-    (outputs,) = inline_function(listing, function, [[listing.add_input(each) for each in group] for group in inputs])
-    leaves = {k: key for k in required_values(listing, outputs) if (key := listing.instructions[k].key) is not None}
-    return BlockFormula(listing, tuple(outputs), leaves)
+    (outputs,) = inline_function(listing, function, [[listing.add_input(leaf) for leaf in group] for group in inputs])
+    return BlockFormula(listing, outputs)
 
 
 class NewtonFormulas(NamedTuple):

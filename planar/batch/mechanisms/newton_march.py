@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.march.prediction import correction_limit, extrapolation_weights
-from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType
+from planar.batch.march.kernel_writer import write_normalised
+from planar.batch.march.prediction import correction_limit, prediction_weights
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType, rotate
 from planar.batch.mechanisms.tape_runs import LEAST_COSINE
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -25,7 +26,7 @@ from planar.codegen.tape import (
     write_ended,
     write_stays,
     write_stays_clear,
-    write_turn_flags,
+    write_turn_check,
 )
 from planar.foundation.arrays import Array
 
@@ -40,8 +41,7 @@ def step_table(steps: int, step: float) -> Array:
     """Of every step of such a length the weights of the moves before, how often it is corrected, and by how much at
     most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
     table = np.zeros((steps, TABLE_COLUMNS))
-    for known in range(1, PREDICTOR_ORDER + 1):
-        table[known + 1 :, :known] = extrapolation_weights(known)
+    table[:, :PREDICTOR_ORDER] = prediction_weights(steps, PREDICTOR_ORDER, 2)
     table[:, -2:] = CORRECTIONS, correction_limit(step)
     table[: PREDICTOR_ORDER + 2, -2], table[: PREDICTOR_ORDER + 1, -1] = FIRST_CORRECTIONS, inf
     return table
@@ -131,9 +131,8 @@ class _NewtonBlockWriter:
         for slot in range(kind.slot_count + 1):
             place = t.add_instruction(f"getelementptr ptr, ptr %rows, i64 {slot}")
             bases.append(t.add_instruction(f"load ptr, ptr {place}"))
-        begin = len(kind.measures) + 2 * len(kind.angle_measures)
         for k, pointer in enumerate(slot_pointer for both in self.unknown_slots for slot_pointer in both):
-            t.store(self._write_load("%p", begin + k), pointer)
+            t.store(self._write_load("%p", kind.number_count + k), pointer)
         for pointer in (slot_pointer for slots in self.history_slots for slot_pointer in slots):
             t.store("zeroinitializer", pointer)
         for pointer in (*self.direction_slots, *self.clear_slots):
@@ -160,13 +159,7 @@ class _NewtonBlockWriter:
         is_good = t.and_flags(t.compare("ole", residual, self.tolerance), t.compare("ole", far, limit))
         places = range(0, len(outputs), self.row_count)
         directions = [LinkDirection(outputs[number + COS], outputs[number + SIN], None) for number in places]
-        is_good = write_turn_flags(
-            t, is_good, directions, [t.load(slot) for slot in self.direction_slots], LEAST_COSINE
-        )
-        for value, slot in zip(
-            (part for direction in directions for part in direction[:2]), self.direction_slots, strict=True
-        ):
-            t.store(value, slot)
+        is_good = write_turn_check(t, is_good, directions, self.direction_slots, LEAST_COSINE)
         clear, previous, earlier = (t.load(slot) for slot in (self.regularity_slot, *self.clear_slots))
         fine = t.and_flags(is_good, write_clear_flags(t, clear, previous, earlier, self.clearance).is_clear)
         t.store(clear, self.clear_slots[0])
@@ -195,21 +188,10 @@ class _NewtonBlockWriter:
         if not self.block_type.unknown_is_angle[k]:
             t.store(t.binary("add", t.load(first), by), first)
             return
-        half = t.binary("mul", by, t.constant(0.5))
-        square = t.binary("mul", half, half)
-        scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
-        cos = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale)
-        sin = t.binary("mul", by, scale)
-        c, s = t.load(first), t.load(second)
-        c, s = (
-            t.binary("sub", t.binary("mul", c, cos), t.binary("mul", s, sin)),
-            t.binary("add", t.binary("mul", s, cos), t.binary("mul", c, sin)),
-        )
+        rotated = rotate(t.binary, t.constant, t.load(first), t.load(second), by)
         # back onto the circle, which rounding leaves
-        size = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        scale_back = t.binary("sub", t.constant(1.5), t.binary("mul", t.constant(0.5), size))
-        t.store(t.binary("mul", c, scale_back), first)
-        t.store(t.binary("mul", s, scale_back), second)
+        for value, slot in zip(write_normalised(t, *rotated), (first, second), strict=True):
+            t.store(value, slot)
 
     def _write_formula(self, formula: BlockFormula, names: dict[FormulaInput, str]) -> list[str]:
         t = self.ir

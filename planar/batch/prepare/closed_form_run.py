@@ -167,7 +167,9 @@ class _PositionsWriter(KernelWriter):
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
         self.lane = t.add_instruction(f"mul i64 %b, {LANES}")
-        inputs = {operand: self.load_entry(rows_of_inputs, k) for k, operand in enumerate(self.input_operands)}
+        inputs = {
+            operand: self.load_entry(rows_of_inputs, k) for k, operand in enumerate(self.equations.input_operands)
+        }
         have |= write_shifted_inputs(t, equations, inputs, have)
         near = [
             *(self.write_closed_form(part, have, as_cosine=True) for part in equations.blocks),

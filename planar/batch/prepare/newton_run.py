@@ -14,9 +14,14 @@ import numpy as np
 
 from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.initial_assembly import CORRECTIONS, find_assemblies
-from planar.batch.march.designs_writer import MARCH_ARGUMENTS, MARCH_FUNCTION, KernelRequest, write_designs_kernel
+from planar.batch.march.designs_writer import (
+    MARCH_ARGUMENTS,
+    MARCH_FUNCTION,
+    DesignsKernelLayout,
+    KernelRequest,
+    write_designs_kernel,
+)
 from planar.batch.march.kernel import KernelBlock, KernelEquations, operand_rows
-from planar.batch.march.kernel_writer import DesignsKernelLayout
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
     LEAST_KERNEL_REGULARITY,
