@@ -229,13 +229,13 @@ def sweep(  # many: the public signature; # long: its docstring
     if listed is not None:
         values = {name: array[listed.design] for name, array in values.items()}
     z = listed and listed.z
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, z, number_type)
-    many = len(next(iter(values.values())))
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, z, number_type, duration)
+    many = whole.design_count
     kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
     width = len(names) + 2 * len(mechanism.links) * any(results)
     width += len(results.derivatives) * (len(names) + len(results.links) + len(results.pairs))
     size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
-    plan = SweepPlan(whole, size, results, listed, duration)
+    plan = SweepPlan(whole, size, results, listed)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
     for done in _solve_blocks(into, threads, executor, reductions):
         report_progress(done, many)
@@ -260,7 +260,7 @@ def _solve_blocks(
     def task(part: slice) -> ResultBlock:
         z = None if whole.assemblies is None else whole.assemblies[:, part]
         own = {name: array[part] for name, array in whole.designs.items()}
-        return ResultBlock(whole._replace(designs=own, assemblies=z), plan.results, plan.duration)
+        return ResultBlock(whole._replace(designs=own, assemblies=z), plan.results)
 
     def solve_here(number: int, block: ResultBlock) -> Any:
         if reductions is not None:
