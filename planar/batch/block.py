@@ -64,6 +64,12 @@ class DesignBlock(NamedTuple):
         assert self.duration is not None
         return np.linspace(0.0, self.duration, self.steps + 1)
 
+    def select(self, which: slice | Array) -> DesignBlock:
+        """Some of the designs."""
+        designs = {name: value[which] for name, value in self.designs.items()}
+        z = None if self.assemblies is None else self.assemblies[:, which]
+        return self._replace(designs=designs, assemblies=z)
+
     def reference(self) -> ReferenceDesign:
         """What the designs have in common."""
         return reference_design(self.mechanism, self.pair, self.duration is not None)

@@ -185,7 +185,9 @@ class ReferenceDesign:
         """
         base_places = [part for link, point in members for part in place_in_link(self.solver.shapes[link], point)]
         zero_places = [k for k, part in enumerate(base_places) if part == 0.0]
-        if zero_rows is None or any(np.any(places[k]) for k in zero_places):
+        # coordinates that no design changes are the reference's own numbers
+        varying = [np.asarray(places[k]) for k in zero_places if places[k] is not base_places[k]]
+        if zero_rows is None or any(place.any() for place in varying):
             return frozenset()
         return frozenset([*(("p", k) for k in zero_rows), *(("q", k) for k in zero_places)])
 
@@ -298,9 +300,8 @@ class DesignFormula:
         formula = record_formula(self._rows, len(self.names))
         point_row = self.sections[-1] + JUDGED_ROWS
         computed = list(formula.results[:point_row])
-        self.varying_zero_rows = [
-            row for row in self.varying_zero_rows if formula.instructions[computed[row]].operation != "const"
-        ]
+        is_zero = [(made.operation, made.number) == ("const", 0.0) for made in formula.instructions]
+        self.varying_zero_rows = [row for row in self.varying_zero_rows if not is_zero[computed[row]]]
         for number in formula.results[point_row:]:
             operation, _, constant, argument = formula.instructions[number]
             if operation == "const":
@@ -354,7 +355,9 @@ class DesignFormula:
                 known = [*arguments, *rows]
                 coordinates = iter(known[part] if isinstance(part, int) else part for part in self.coordinates)
         rows = np.ascontiguousarray(rows)
-        p, u, u1, u2, (margin, total, reach), _ = np.split(rows, [*self.sections, point_row])
+        sections = zip([0, *self.sections], self.sections, strict=False)
+        p, u, u1, u2 = (rows[first:last] for first, last in sections)
+        margin, total, reach = rows[self.sections[-1] : point_row]
         shapes = dict(self.reference.solver.shapes)
         for link in self.changed_links:
             shape = shapes[link]

@@ -102,7 +102,7 @@ class _ResultBlockSolver:
         parts = split_into_blocks(self.design_count, max(1, MAX_PART_POSITIONS // len(done.out)))
         for part in parts if self.links else ():
             inputs = done.input if done.input.ndim == 1 else done.input[part]
-            solved = _SolvedPart(part, _select_designs(block, part), done.status[part], inputs)
+            solved = _SolvedPart(part, block.select(part), done.status[part], inputs)
             frames = self._frames(solved, np.moveaxis(places_out[:, :, point_rows:, part], 1, 0))
             unclear = np.flatnonzero(~frames.is_clear & (solved.status[:, 0] == 0))
             if unclear.size:
@@ -128,7 +128,7 @@ class _ResultBlockSolver:
         self.slopes.write_free(slopes, slope_rows)
         designs = np.flatnonzero(is_missing.any(axis=0))
         if designs.size:
-            block = _select_designs(self.block, designs)._replace(points=())
+            block = self.block.select(designs)._replace(points=())
             results = self.results._replace(outputs=(), efforts=(), reactions=())
             others = solve_result_block(ResultBlock(block, results, is_missing[:, designs])).out
             known = slope_rows[:, :, designs]
@@ -235,9 +235,3 @@ class _SolvedPart(NamedTuple):
     block: DesignBlock
     status: Array
     input: Array
-
-
-def _select_designs(block: DesignBlock, which: slice | IntArray) -> DesignBlock:
-    """Some designs of a block."""
-    designs = {name: np.asarray(value)[which] for name, value in block.designs.items()}
-    return block._replace(designs=designs, assemblies=None if block.assemblies is None else block.assemblies[:, which])
