@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
-from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.design_stops import DesignStops
 from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
@@ -20,9 +20,9 @@ from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.instruction_list import UnsupportedOperation
-from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
+from planar.solving.runs.continuous_run import input_law_rates
 
 Array = np.ndarray
 
@@ -38,6 +38,7 @@ class DesignBlock(NamedTuple):
 
     `assemblies`: unknowns (unknowns, designs) at the designs' own inputs, where it is not the sketch that chooses; not
     numbers of a design that has no assembly. `dtype`: of the results, which are rounded to it when they are written.
+    `duration`: how long (s) a run in time takes, None where one input runs over a range.
     """
 
     mechanism: Mechanism
@@ -50,15 +51,47 @@ class DesignBlock(NamedTuple):
     pair: str | None
     assemblies: Array | None = None
     dtype: str = "float64"
+    duration: float | None = None
+
+    @property
+    def design_count(self) -> int:
+        """How many designs there are."""
+        return len(next(iter(self.designs.values())))
+
+    @property
+    def time(self) -> Array:
+        """The times (steps + 1,) of a run in time, s."""
+        assert self.duration is not None
+        return np.linspace(0.0, self.duration, self.steps + 1)
+
+    def select(self, which: slice | Array) -> DesignBlock:
+        """Some of the designs."""
+        designs = {name: value[which] for name, value in self.designs.items()}
+        z = None if self.assemblies is None else self.assemblies[:, which]
+        return self._replace(designs=designs, assemblies=z)
+
+    def reference(self) -> ReferenceDesign:
+        """What the designs have in common."""
+        return reference_design(self.mechanism, self.pair, self.duration is not None)
+
+    def single_design(self, index: int) -> Mechanism:
+        """One design, with a sketch of its assembly where that is given."""
+        reference = self.reference()
+        design = with_design_values(reference.mechanism, values_of_design(self.designs, index))
+        if self.assemblies is None:
+            return design
+        u = reference.design_rows(self.designs, self.design_count).u[:, index]
+        return reference.with_sketch_of(design, self.assemblies[:, index], u)
 
 
 class SolvedDesigns(NamedTuple):
     """A solved block: out (steps + 1, rows, designs), x and y of every point, then first, then second rates (m, s);
-    status (designs, steps + 1); positions of the running input (steps + 1,) or (designs, steps + 1); how many positions
-    the general path solved, how many designs it was given; by outcome how many designs ended so, and what is said of
-    one, which as text is its sentence: by that of what is solved, how many lack rates, or digits of them. dead_point
-    (designs,): where the running input is at the dead point that ends a design (rad, m), not a number where none does;
-    stop_position (designs,): the same of the stop that a pair meets.
+    status (designs, steps + 1); positions of the running input (steps + 1,) or (designs, steps + 1), times (steps + 1,)
+    of a run in time; how many positions the general path solved, how many designs it was given; by outcome how many
+    designs ended so, and what is said of one, which as text is its sentence: by that of what is solved, how many lack
+    rates, or digits of them. dead_point (designs,): where the running input is at the dead point that ends a design
+    (rad, m), not a number where none does, nor in time; stop_position (designs,): the same of the stop that a pair
+    meets.
     """
 
     out: Array
@@ -71,31 +104,41 @@ class SolvedDesigns(NamedTuple):
     stop_position: Array
 
 
-def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDesigns:
-    """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
-    designs."""
-    with take_turn():
-        return DesignBlockSolver(block, out).solve()
-
-
 def status_code(outcome: Outcome) -> int:
     """What stands for an outcome in a status."""
     return OUTCOMES.index(outcome)
 
 
+def input_motions(mechanism: Mechanism, block: DesignBlock, time: Array) -> Array:
+    """Positions, first and second rates of the inputs (3, inputs, steps + 1, designs) of designs at times (steps + 1,)
+    (SI)."""
+    variables = design_variables(mechanism)
+    of_inputs = {name: value for name, value in block.designs.items() if variables[name].path[0] == "inputs"}
+    designs = [
+        with_design_values(mechanism, values_of_design(of_inputs, index))
+        for index in range(block.design_count if of_inputs else 1)
+    ]
+    rates = np.array([[input_law_rates(driven, time)[:3] for driven in design.inputs] for design in designs])
+    rates = rates.transpose(2, 1, 3, 0)
+    return np.broadcast_to(rates, (*rates.shape[:3], block.design_count))
+
+
 class DesignBlockSolver:
-    """Solves one block, see `solve_design_block`; then `march` is what ran compiled, from where it started."""
+    """Solves one block, in `out` (steps + 1, rows, designs) if that is given; then `march` is what ran compiled over a
+    range, from where it started.
+
+    One input runs over a range, or all run in time by their laws. Raises BadInput only for what holds for all designs.
+    """
 
     def __init__(self, block: DesignBlock, out: Array | None):
         self.block, self.out = block, out
-        self.reference: ReferenceDesign = reference_design(block.mechanism, block.pair)
-        self.design_count = len(next(iter(block.designs.values())))
+        self.reference, self.design_count = block.reference(), block.design_count
         self.scale = float(self.reference.input_scale[self.reference.running_index])
         self.rows = self.reference.design_rows(block.designs, self.design_count)
-        self.u = np.ascontiguousarray(self.rows.u)
-        here = self.u[self.reference.running_index] * self.scale
-        self.start: Array = here if block.start is None else np.full(self.design_count, float(block.start))
-        self.has_own_range = self.reference.is_sliding and block.stop is None
+        self.u = self.rows.u
+        own_start = self.u[self.reference.running_index] * self.scale
+        self.start: Array = own_start if block.start is None else np.full(self.design_count, float(block.start))
+        self.has_own_range = self.reference.is_sliding and block.stop is None and block.duration is None
         "whether every design has a range of its own, from limit to limit"
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design that was followed to its end, or to a dead point"
@@ -111,18 +154,15 @@ class DesignBlockSolver:
         "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
         self.range_length: Array = np.broadcast_to(length, self.start.shape)
+        self.has_common_length = bool(np.ptp(self.range_length) == 0.0)
         self.march: DesignBatch | None = None
 
     def solve(self) -> SolvedDesigns:
-        """See `solve_design_block`."""
+        """Solve the block: compiled as far as the checks let designs pass, all others by the general path."""
         block = self.block
-        same = bool(np.ptp(self.range_length) == 0.0)
-        # farther the general path counts turns
-        runs = self.reference.can_be_compiled and np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
-        runs = runs and (block.start is None or (same and not self.has_own_range))
-        found = self._run_compiled(same and not self.has_own_range) if runs else None
-        out, good = found or (self._output_array(), np.zeros(self.design_count, dtype=int))
-        if found is None:
+        compiled = self._run_compiled() if self._can_be_compiled() else None
+        out, good = compiled or (self._output_array(), np.zeros(self.design_count, dtype=int))
+        if compiled is None:
             out[:] = np.nan
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
@@ -141,47 +181,61 @@ class DesignBlockSolver:
         else:
             # one number for all, which takes no room
             status = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
-        inputs = self._input_positions(same)
+        inputs = self._input_positions()
         self.endings = {
-            int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
-            for each in np.unique(code[code != 0])
+            int(number): (int(np.sum(code == number)), self._question(int(np.argmax(code == number)), inputs))
+            for number in np.unique(code[code != 0])
         }
         for index in rest:
             self._solve_alone(index, out, status, inputs)
-        many, ends = (self.general_positions, len(rest) + self.followed_designs), (self.dead_point, self.stop_position)
-        return SolvedDesigns(out, status, inputs, *many, tuple((k, *said) for k, said in self.endings.items()), *ends)
+        counts = self.general_positions, len(rest) + self.followed_designs
+        endings = tuple((number, *ending) for number, ending in self.endings.items())
+        return SolvedDesigns(out, status, inputs, *counts, endings, self.dead_point, self.stop_position)
 
-    def _input_positions(self, same: bool) -> Array:
-        """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges."""
+    def _can_be_compiled(self) -> bool:
+        """Whether designs may run compiled, as far as the mechanism and the range tell."""
+        reference, block = self.reference, self.block
+        if not reference.can_be_compiled:
+            return False
+        if block.duration is not None:
+            return not reference.mechanism.stops
+        has_common_range = self.has_common_length and not self.has_own_range
+        # farther the general path counts turns
+        is_counted = np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
+        return bool(is_counted and (block.start is None or has_common_range))
+
+    def _input_positions(self) -> Array:
+        """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges. The
+        times of a run in time."""
+        if self.block.duration is not None:
+            return self.block.time
         grid = np.linspace(0.0, 1.0, self.block.steps + 1)
         if self.has_own_range:
             low, high = self.limits * self.scale
             return np.asarray(low[:, None] + (high - low)[:, None] * grid)
-        if same and np.ptp(self.start) == 0.0:
+        if self.has_common_length and np.ptp(self.start) == 0.0:
             return np.asarray(self.start[0] + self.range_length[0] * grid)
         return np.asarray(self.start[:, None] + self.range_length[:, None] * grid)
 
     def _question(self, index: int, inputs: Array) -> DesignQuestion:
-        """A design, and the range that it is to run."""
+        """A design, and the range or the time that it is to run."""
         block, mechanism, values = self.block, self.reference.mechanism, values_of_design(self.block.designs, index)
         if block.assemblies is not None:
-            design = with_design_values(mechanism, values)
-            mechanism = self.reference.with_sketch_of(design, block.assemblies[:, index], self.u[:, index])
-            values = {}
+            mechanism, values = block.single_design(index), {}
         grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
-        return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends)
+        return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends, block.duration)
 
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""
-        told = self._question(index, inputs).solve(self.block.points, self.block.rates)
-        out[:, :, index], status[index], self.dead_point[index] = told.out, told.status, told.dead_point
-        self.stop_position[index] = told.stop_position
+        solved = self._question(index, inputs).solve(self.block.points, self.block.rates)
+        out[:, :, index], status[index], self.dead_point[index] = solved.out, solved.status, solved.dead_point
+        self.stop_position[index] = solved.stop_position
         if self.has_own_range:
-            inputs[index] = told.input
-        self.general_positions += int(np.sum(told.status == 0))
-        self._count_sentence(int(told.status[-1]), told.message)
-        self._count_sentence(status_code(Outcome.SOLVED), told.rate_remark)
+            inputs[index] = solved.input
+        self.general_positions += int(np.sum(solved.status == 0))
+        self._count_sentence(int(solved.status[-1]), solved.message)
+        self._count_sentence(status_code(Outcome.SOLVED), solved.rate_remark)
 
     def _count_sentence(self, code: int, sentence: str | NoAnswer) -> None:
         """Count a design with a sentence for a code; the sentence of the first design is kept."""
@@ -189,40 +243,69 @@ class DesignBlockSolver:
             count, first = self.endings.get(code, (0, sentence))
             self.endings[code] = count + 1, first
 
-    def _run_compiled(self, is_common: bool) -> tuple[Array, Array] | None:
+    def _run_compiled(self) -> tuple[Array, Array] | None:
         """Return out (m, s) and the number of first steps that passed (designs,); None where the structure cannot be
-        compiled. `is_common`: all designs run over ranges of equal length."""
-        block, reference, shapes, p = self.block, self.reference, self.rows.shapes, self.rows.p
+        compiled."""
+        block, reference, shapes = self.block, self.reference, self.rows.shapes
         members = {name: reference.point_member(name) for name in block.points}
         moving = [member for member in members.values() if member[0] != reference.mechanism.frame]
         if block.assemblies is None:
-            start = find_assemblies(reference, shapes, p, self.u)
+            start = find_assemblies(reference, self.rows)
         else:
             start = given_assemblies(block.assemblies)
-        self.failed_block = start.failed_block
+        if block.duration is None:  # in time the general path says where inputs start by their laws
+            self.failed_block = start.failed_block
         fit = start.is_sure & self.rows.is_fit & ~reference.is_unfit(block.designs, shapes)
-        fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
-        offsets = np.zeros((block.steps + 1, len(self.u)))
-        u0 = self.u.copy()
-        u0[reference.running_index] = self.start / self.scale
-        offsets[:, reference.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
-        march = reference.design_batch(shapes, p, (u0, self.rows.u1, self.rows.u2), moving, block.rates)
-        march = march._replace(z0=start.z, signs=start.signs, input_offsets=offsets)
-        if reference.mechanism.stops:
-            march = self._watch_stops(march, fit)
+        march = reference.design_batch(self.rows, moving, block.rates)._replace(z0=start.z, signs=start.signs)
         try:
-            if not is_common:
-                out = self._run_own_ranges(march, fit, start.signs)
-                return None if out is None else (self._with_frame_points(out, members, shapes), np.zeros(len(fit), int))
-            march, fit = self._lead_to_start(march, fit, start.signs)
-            fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
-            out, good, candidates = self._run_fit_designs(march, fit)
-            self._end_at_input_stops(march, good, candidates)
+            run = self._run_over_range if block.duration is None else self._run_in_time
+            out, good = run(march, fit)
         except UnsupportedOperation:
             return None
-        self._follow_to_dead_points(march, out, (good, candidates), start.signs)
-        erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
         return self._with_frame_points(out, members, shapes), good
+
+    def _run_in_time(self, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
+        """out and good of a run in time: designs whose inputs move alike go side by side where only positions are
+        wanted, or where all inputs keep their speed. Raises UnsupportedOperation."""
+        block, reference = self.block, self.reference
+        u, u1, u2 = input_motions(reference.mechanism, block, block.time) / reference.input_scale[:, None, None]
+        fit &= np.abs(u).max(axis=(0, 1)) <= LARGEST_INPUT_POSITION
+        if block.rates:
+            fit &= np.all((np.ptp(u1, axis=1) == 0.0) & np.all(u2 == 0.0, axis=1), axis=0)
+        march = march._replace(u0=u[:, 0], u1=u1[:, 0], u2=u2[:, 0], signs=None)
+        offsets = (u - u[:, :1]).transpose(1, 0, 2)  # (steps + 1, inputs, designs)
+        out, counts = self._own_output(march), np.zeros((2, self.design_count), dtype=int)
+        out[:] = np.nan
+        chosen = np.flatnonzero(fit)
+        if chosen.size:
+            columns = offsets[:, :, chosen].reshape(-1, chosen.size)
+            courses = np.unique(columns, axis=1, return_inverse=True)[1].ravel()
+            for course in range(int(courses.max()) + 1):
+                alike = chosen[courses == course]
+                course_offsets = np.ascontiguousarray(offsets[:, :, alike[0]])
+                self._run_selected(march._replace(input_offsets=course_offsets), alike, out, counts)
+        return out, counts[0]
+
+    def _run_over_range(self, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
+        """out and good where one input runs over a range. Raises UnsupportedOperation."""
+        index = self.reference.running_index
+        fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
+        offsets = np.zeros((self.block.steps + 1, len(self.u)))
+        u0 = self.u.copy()
+        u0[index] = self.start / self.scale
+        offsets[:, index] = np.linspace(0.0, self.range_length[0] / self.scale, self.block.steps + 1)
+        march = march._replace(u0=u0, input_offsets=offsets)
+        if self.reference.mechanism.stops:
+            march = self._watch_stops(march, fit)
+        if self.has_own_range or not self.has_common_length:
+            return self._run_own_ranges(march, fit), np.zeros(self.design_count, dtype=int)
+        march, fit = self._lead_to_start(march, fit)
+        fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
+        out, good, candidates = self._run_fit_designs(march, fit)
+        self._end_at_input_stops(march, good, candidates)
+        self._follow_to_dead_points(march, out, good, candidates)
+        erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
+        return out, good
 
     def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
         """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
@@ -238,21 +321,21 @@ class DesignBlockSolver:
         """End designs at a stop of the input that runs, beyond which they would have gone on."""
         if self.stops is None:
             return
-        input_stops = self.stops.find_input_stops(march, self.range_length)
-        stopped = np.flatnonzero((good > input_stops.solved_steps) & input_stops.is_clear)
+        distance, solved, is_clear = self.stops.find_input_stops(march, self.range_length)
+        stopped = np.flatnonzero((good > solved) & is_clear)
         candidates[:] = np.maximum(candidates, good)
-        np.minimum(good, input_stops.solved_steps, out=good)
-        self.solved_steps[stopped] = input_stops.solved_steps[stopped]
-        self._keep_ends(stopped, input_stops.distance[stopped], np.ones(stopped.size, dtype=bool))
+        np.minimum(good, solved, out=good)
+        self.solved_steps[stopped] = solved[stopped]
+        self._keep_ends(stopped, distance[stopped], np.ones(stopped.size, dtype=bool))
 
-    def _run_own_ranges(self, march: DesignBatch, fit: Array, signs: Array | None) -> Array | None:
-        """Return out of designs whose ranges differ; None where a block is not in closed form."""
+    def _run_own_ranges(self, march: DesignBatch, fit: Array) -> Array:
+        """Return out of designs whose ranges differ. Raises UnsupportedOperation where a block is not in closed
+        form."""
         fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
         chosen = np.flatnonzero(fit & (self.range_length != 0.0))
-        chosen_signs = None if signs is None else signs[:, chosen]
-        designs = closed_form_designs(march.select(chosen), self.reference.running_index, chosen_signs)
+        designs = closed_form_designs(march.select(chosen), self.reference.running_index)
         if designs is None:
-            return None
+            raise UnsupportedOperation("a block is not in closed form")
         out = self._own_output(march)
         out[:] = np.nan
         if not self.has_own_range:
@@ -292,34 +375,30 @@ class DesignBlockSolver:
             # where all designs are fit, few end early
             return out, run_designs(needed, out[:steps], None if fit.all() else candidates), candidates
         out[:] = np.nan
-        chosen, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
+        chosen, counts = np.flatnonzero(fit), np.zeros((2, self.design_count), dtype=int)
         if chosen.size:
-            rows, chosen_candidates = (
-                allocate_aligned(steps, march.output_row_count, chosen.size, out.dtype),
-                good[chosen],
-            )
-            good[chosen] = run_designs(needed.select(chosen), rows, chosen_candidates)
-            out[:steps, :, chosen], candidates[chosen] = rows, chosen_candidates
-        return out, good, candidates
+            self._run_selected(needed, chosen, out, counts)
+        return out, *counts
 
-    def _follow_to_dead_points(
-        self,
-        march: DesignBatch,
-        out: Array,
-        counts: tuple[Array, Array],
-        signs: Array | None,
-    ) -> None:
+    @staticmethod
+    def _run_selected(march: DesignBatch, chosen: Array, out: Array, counts: Array) -> None:
+        """Run some designs of a march, and put their rows and counts among those of all: out, and counts (2, designs)
+        of the good steps and of the candidates."""
+        rows = allocate_aligned(len(march.input_offsets), march.output_row_count, chosen.size, out.dtype)
+        candidates = np.zeros(chosen.size, dtype=int)
+        counts[0, chosen] = run_designs(march.select(chosen), rows, candidates)
+        out[: len(rows), :, chosen], counts[1, chosen] = rows, candidates
+
+    def _follow_to_dead_points(self, march: DesignBatch, out: Array, good: Array, candidates: Array) -> None:
         """Follow the designs that compiled code did not bring to the end, all at once, to their ends.
 
-        counts: the numbers of good steps and of candidates of each design (designs,).
+        good and candidates: the numbers of steps of each design (designs,).
         """
-        good, candidates = counts
         open_ = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
         if not open_.size:
             return
         index = self.reference.running_index
-        open_signs = None if signs is None else signs[:, open_]
-        designs = closed_form_designs(march.select(open_), index, open_signs)
+        designs = closed_form_designs(march.select(open_), index)
         if designs is not None:
             lengths = self.range_length[open_] / self.scale
             ends = find_ends(designs, lengths, good[open_], np.maximum(good, candidates)[open_], self.block.steps)
@@ -347,7 +426,7 @@ class DesignBlockSolver:
         self.stop_position[settled] = np.where(ended & is_stopped, position, np.nan)
         self.is_stopped[settled] = is_stopped
 
-    def _lead_to_start(self, march: DesignBatch, fit: Array, signs: Array | None) -> tuple[DesignBatch, Array]:
+    def _lead_to_start(self, march: DesignBatch, fit: Array) -> tuple[DesignBatch, Array]:
         """Lead the assemblies at the designs' own inputs to where the march starts; return the march from there, and
         which designs arrived (designs,)."""
         offset = march.u0 - self.u
@@ -358,8 +437,7 @@ class DesignBlockSolver:
             return march, np.zeros_like(fit)
         index, chosen = self.reference.running_index, np.flatnonzero(fit)
         origin = march._replace(u0=self.u).select(chosen)
-        chosen_signs = None if signs is None else signs[:, chosen]
-        designs, arrived = closed_form_designs(origin, index, chosen_signs), np.zeros_like(fit)
+        designs, arrived = closed_form_designs(origin, index), np.zeros_like(fit)
         span = offset[index, chosen]
         if designs is not None:
             z, ends = designs.lead(span, LEAD_IN_STEP)

@@ -40,7 +40,8 @@ class SolvedDesign(NamedTuple):
 
 
 class DesignQuestion(NamedTuple):
-    """A design by its numbers, and the arguments of `solve_design`; its text says why the design ends."""
+    """A design by its numbers, and the arguments of `solve_design`, or of `solve_timed_design` where it has a duration
+    (s); its text says why the design ends."""
 
     mechanism: Mechanism
     values: Mapping[str, float]
@@ -48,10 +49,14 @@ class DesignQuestion(NamedTuple):
     grid: Array | None
     steps: int
     range: tuple[float | None, float | None]
+    duration: float | None = None
 
     def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:
         """See `solve_design`."""
-        return solve_design(with_design_values(self.mechanism, self.values), *self[2:], points, rates)
+        design = with_design_values(self.mechanism, self.values)
+        if self.duration is not None:
+            return solve_timed_design(design, self.duration, self.steps, points, rates)
+        return solve_design(design, self.pair, self.grid, self.steps, self.range, points, rates)
 
     def __str__(self) -> str:
         return str(self.solve((), False).message)
@@ -81,14 +86,16 @@ def solve_design(
 def solve_timed_design(
     mechanism: Mechanism, duration: float, steps: int, points: tuple[PointName, ...], rates: bool
 ) -> SolvedDesign:
-    """Solve a design in time, all its inputs by their laws or rates: as `solve_design`, `input` is the times (s)."""
+    """Solve a design in time, all its inputs by their laws or rates: as `solve_design`, but `input` is the times (s),
+    and no position of one input ends it."""
 
     def run() -> tuple[Motion, Array]:
         motion = cycle(mechanism, steps, duration=duration)
         assert motion.time is not None
         return motion, motion.time
 
-    return _solve(run, np.linspace(0.0, duration, steps + 1), steps, points, rates)
+    solved = _solve(run, np.linspace(0.0, duration, steps + 1), steps, points, rates)
+    return solved._replace(dead_point=np.nan, stop_position=np.nan)
 
 
 class GridMotion(NamedTuple):

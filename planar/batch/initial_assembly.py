@@ -5,8 +5,6 @@ By closed forms where all blocks have one, else near the reference design's own;
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import (
@@ -23,11 +21,10 @@ from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, fi
 from planar.batch.march.design_batch import CorrectedAssemblies, DesignBatch
 from planar.batch.march.kernel import unknowns_from_state
 from planar.batch.march.runs import correct_designs
-from planar.batch.reference_design import ReferenceDesign, shape_of_designs
+from planar.batch.reference_design import DesignRows, ReferenceDesign
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.instruction_list import UnsupportedOperation
-from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, SAME_ASSEMBLY_TOLERANCE
 
 Array = np.ndarray
@@ -45,33 +42,22 @@ def given_assemblies(z: Array) -> DesignAssemblies:
     return DesignAssemblies(z, np.isfinite(z).all(axis=0), np.full(z.shape[1], -1))
 
 
-def find_assemblies(
-    reference: ReferenceDesign,
-    shapes: Mapping[str, LinkShape],
-    p: Array,
-    u: Array,
-) -> DesignAssemblies:
-    """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
+def find_assemblies(reference: ReferenceDesign, rows: DesignRows) -> DesignAssemblies:
+    """The assemblies of designs with these numbers at their inputs."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        assemblies = _find_without_search(reference, shapes, p, u)
+        assemblies = _find_without_search(reference, rows)
         if assemblies is None:
-            return AssemblySearch(reference, shapes, p, u).search()
+            return AssemblySearch(reference, rows).search()
         rest = np.flatnonzero(~assemblies.is_sure & (assemblies.failed_block < 0))
         if rest.size > (0 if assemblies.signs is None else MAX_ALONE):
-            rest_shapes = {name: shape_of_designs(shape, rest) for name, shape in shapes.items()}
-            searched = AssemblySearch(reference, rest_shapes, p[:, rest], u[:, rest]).search()
+            searched = AssemblySearch(reference, rows.select(rest)).search()
             assemblies.z[:, rest], assemblies.is_sure[rest], assemblies.failed_block[rest] = searched[:3]
             if assemblies.signs is not None:
                 assemblies.signs[:, rest] = 0.0
         return assemblies
 
 
-def _find_without_search(
-    reference: ReferenceDesign,
-    shapes: Mapping[str, LinkShape],
-    p: Array,
-    u: Array,
-) -> DesignAssemblies | None:
+def _find_without_search(reference: ReferenceDesign, rows: DesignRows) -> DesignAssemblies | None:
     """Those by closed forms, else those near the base's own; None where the sketch does not show every block, or the
     structure allows neither."""
     candidates, equations = reference.candidates, reference.functions.equations
@@ -82,7 +68,7 @@ def _find_without_search(
     names = [name for names in names_of_block.values() for name in names]
     point_blocks = tuple(index for index, names in names_of_block.items() for _ in names)
     sketch = np.array([candidates.sketch[name] for name in names]).reshape(-1, 2)
-    batch = reference.design_batch(shapes, p, (u, u, u), [candidates.first_link[name][1:] for name in names])
+    batch = reference.design_batch(rows, [candidates.first_link[name][1:] for name in names])
     joiner = find_joiner(batch, point_blocks)
     if joiner is not None:
         return _JoinedAssemblySearch(joiner, batch, sketch).search()
@@ -199,7 +185,7 @@ class _NearReferenceSearch:
     ):
         self.batch, self.blocks, self.point_blocks, self.sketch = batch, blocks, point_blocks, sketch[..., None]
         self.is_angle = reference.functions.equations.unknown_is_angle
-        pairs = zip(reference.functions.equations.blocks, reference.block_assemblies(), strict=True)
+        pairs = zip(reference.functions.equations.blocks, reference.block_assemblies, strict=True)
         self.roots = {block.block_index: roots for block, roots in pairs}
         start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in self.roots.values() if len(roots))])
         self.batch.z0[:] = start[:, None]

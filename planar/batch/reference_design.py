@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, reduce
-from itertools import combinations
-from math import isfinite
+from itertools import chain, combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +43,8 @@ KINEMATIC_SECTIONS = ("links", "pairs", "inputs")
 """Sections of the file whose numbers the equations take."""
 MAX_KEPT_FORMULAS = 64
 """Formulas of designs, by the names of what they differ in, that are kept."""
+JUDGED_ROWS = 3
+"""Rows by which designs are judged, behind those of pairs and inputs: the margin, the sum and the reach."""
 MAX_ROOTS = 16
 """Assemblies of the base from which those of its designs are looked for."""
 
@@ -52,7 +53,11 @@ class DesignRows(NamedTuple):
     """The numbers of designs: p (numbers, designs) of all pairs, and of the inputs the positions u and the rates u1 and
     u2 (inputs, designs), each in sizes or rad; the shapes of the links (m), whose coordinates are arrays (designs,)
     where designs differ; and which designs have finite numbers and no arm so short that rounding takes its digits
-    (designs,)."""
+    (designs,).
+
+    `tolerance`: what the residual check allows for these designs, as `PreparedMechanism.tolerance`, of the longest of
+    any; `zero_rows`: the rows of p that are zero in the reference, None where they are not zero in every design.
+    """
 
     p: Array
     u: Array
@@ -60,6 +65,14 @@ class DesignRows(NamedTuple):
     u2: Array
     shapes: Mapping[str, LinkShape]
     is_fit: BoolArray
+    tolerance: float
+    zero_rows: tuple[int, ...] | None
+
+    def select(self, designs: Array) -> DesignRows:
+        """The numbers of some of the designs, judged by the tolerance of all."""
+        p, u, u1, u2 = (rows[:, designs] for rows in self[:4])
+        shapes = {name: _map_shape(shape, lambda part: part[designs]) for name, shape in self.shapes.items()}
+        return self._replace(p=p, u=u, u1=u1, u2=u2, shapes=shapes, is_fit=self.is_fit[designs])
 
 
 class ReferenceDesign:
@@ -144,75 +157,44 @@ class ReferenceDesign:
                 for link in designs.links
             }
 
-    def tolerance(self, p: Array) -> float:
-        """What the residual check allows for these designs: as `PreparedMechanism.tolerance`, of the longest of any."""
-        rows = self._length_rows
-        least, greatest = (bound[rows] for bound in self._row_bounds(p))
-        reach = float(max(greatest.max(initial=0.0), -least.min(initial=0.0)))
-        if not isfinite(reach):
-            reach = float(np.nanmax(np.abs(p[rows]), initial=0.0))
-        return float(residual_tolerance(len(self.mechanism.links), reach))
-
-    def _row_bounds(self, p: Array) -> tuple[Array, Array]:
-        """The least and the greatest of each row of p (numbers, designs), not numbers where one is none; kept for the
-        last p, which is asked for several times."""
-        of, bounds = self._last_bounds
-        if of is not p:
-            bounds = (p.min(axis=1), p.max(axis=1)) if p.size else (np.zeros(len(p)), np.zeros(len(p)))
-            self._last_bounds = p, bounds
-        return bounds
-
-    _last_bounds: tuple[Array | None, tuple[Array, Array]] = None, (np.zeros(0), np.zeros(0))
-
     @cached_property
-    def _length_rows(self) -> list[int]:
+    def length_rows(self) -> list[int]:
         """The rows of p that are lengths."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         return [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
 
-    def design_batch(
-        self,
-        shapes: Mapping[str, LinkShape],
-        p: Array,
-        inputs: tuple[Array, Array, Array],
-        members: Iterable[PointMember],
-        rates: bool = False,
-    ) -> DesignBatch:
-        """Designs of these shapes and numbers, at their inputs (position, first and second rate), with points to tell.
+    def design_batch(self, rows: DesignRows, members: Iterable[PointMember], rates: bool = False) -> DesignBatch:
+        """Designs of these numbers at their inputs, with points to tell.
 
         `members`: (link, point) of each, none on the frame. The unknowns, and where the inputs go, are still to be set.
         """
-        u, u1, u2 = inputs
-        members, many = tuple(members), p.shape[1]
-        q = (
-            stack_rows([part for link, point in members for part in place_in_link(shapes[link], point)], many)
-            / self.unit
-        )
-        links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
-        offsets, tolerance, zeros = np.zeros((1, len(u))), self.tolerance(p), self._zeros(p, q, members)
-        return DesignBatch(
-            self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit, zeros
-        )
+        members, design_count = tuple(members), rows.p.shape[1]
+        places = [part for link, point in members for part in place_in_link(rows.shapes[link], point)]
+        q = stack_rows(places, design_count) / self.unit
+        links = tuple(link for link, _ in members)
+        z0, offsets = np.zeros((len(self.functions.equations.unknowns), design_count)), np.zeros((1, len(rows.u)))
+        march = self.functions, self.mechanism, rows.p, q, z0, offsets, rows.u, rows.u1, rows.u2, links, rates
+        return DesignBatch(*march, rows.tolerance, self.unit, self._zeros(rows.zero_rows, places, members))
 
-    def _zeros(self, p: Array, q: Array, members: Sequence[PointMember]) -> frozenset[tuple[str, int]]:
-        """Rows of p and q that are nothing in all designs: those that are it in the base, or none.
+    def _zeros(
+        self, zero_rows: Sequence[int] | None, places: Sequence[Scalar | Array], members: Sequence[PointMember]
+    ) -> frozenset[tuple[str, int]]:
+        """Rows of p and q that are zero in all designs: those that are zero in the reference, or none.
 
-        So all designs of a mechanism share their code, but for those that give such a number a value.
+        So all designs of a mechanism share their code, except those that give such a number a value.
         """
-        of_p, of_q = self._zero_rows_of_p, [k for k, part in enumerate(self._base_places(members)) if part == 0.0]
-        if any(bound[of_p].any() for bound in self._row_bounds(p)) or any(q[k].any() for k in of_q):
+        base_places = [part for link, point in members for part in place_in_link(self.solver.shapes[link], point)]
+        zero_places = [k for k, part in enumerate(base_places) if part == 0.0]
+        # coordinates that no design changes are the reference's own numbers
+        varying = [np.asarray(places[k]) for k in zero_places if places[k] is not base_places[k]]
+        if zero_rows is None or any(place.any() for place in varying):
             return frozenset()
-        return frozenset([*(("p", k) for k in of_p.tolist()), *(("q", k) for k in of_q)])
-
-    def _base_places(self, members: Sequence[PointMember]) -> Iterator[Scalar]:
-        """q of the base, number by number."""
-        for link, point in members:
-            yield from place_in_link(self.solver.shapes[link], point)
+        return frozenset([*(("p", k) for k in zero_rows), *(("q", k) for k in zero_places)])
 
     @cached_property
-    def _zero_rows_of_p(self) -> Array:
-        """The rows of p that are nothing in the base."""
-        return np.flatnonzero(pair_numbers(self.mechanism, self.solver.shapes, self.unit) == 0.0)
+    def zero_rows(self) -> tuple[int, ...]:
+        """The rows of p that are zero in the reference."""
+        return tuple(np.flatnonzero(pair_numbers(self.mechanism, self.solver.shapes, self.unit) == 0.0).tolist())
 
     def design_rows(self, values: Mapping[str, Array], count: int) -> DesignRows:
         """The numbers of so many designs with these values (designs,) by name."""
@@ -231,20 +213,20 @@ class ReferenceDesign:
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
         """The designs that are looked at one by one (designs,): pairs may refuse them before anything moves, or they
         have a sketch of their own."""
-        many = len(next(iter(values.values())))
-        found = np.zeros(many, dtype=bool)
-        choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
+        count = len(next(iter(values.values())))
+        is_unfit = np.zeros(count, dtype=bool)
+        can_misfit = any(type(pair).find_misfit is not Pair.find_misfit for pair in self.mechanism.pairs)
         known = design_variables(self.mechanism)
         for name, value in values.items():
             if known[name].path[0] == "sketch":
-                found |= value != known[name].value
+                is_unfit |= value != known[name].value
         of_pairs = {name: value for name, value in values.items() if known[name].path[0] == "pairs"}
-        if choosy and (of_pairs or any(known[name].link for name in values)):
-            for index in range(many):
-                own = {name: shape_of_design(each, index) for name, each in shapes.items()}
+        if can_misfit and (of_pairs or any(known[name].link for name in values)):
+            for index in range(count):
+                design_shapes = {name: shape_of_design(shape, index) for name, shape in shapes.items()}
                 pairs = with_design_values(self.mechanism, values_of_design(of_pairs, index)).pairs
-                found[index] |= any(pair.find_misfit(pairs, own, str) for pair in pairs)
-        return found
+                is_unfit[index] |= any(pair.find_misfit(pairs, design_shapes, str) for pair in pairs)
+        return is_unfit
 
     @cached_property
     def arms(self) -> tuple[tuple[str, str, str], ...]:
@@ -267,32 +249,27 @@ class ReferenceDesign:
             }
             yield from ((link, *both) for both in combinations(sorted(pinned), 2))
 
+    @cached_property
     def block_assemblies(self) -> tuple[tuple[Array, int], ...]:
-        """For every block the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
-
-        Looked for once, when first asked for.
-        """
-        if self._block_assemblies is None:
-            self._block_assemblies = tuple(self._search_block_assemblies())
-        return self._block_assemblies
-
-    _block_assemblies: tuple[tuple[Array, int], ...] | None = None
-
-    def _search_block_assemblies(self) -> Iterator[tuple[Array, int]]:
-        candidates = self.candidates
+        """For every block the assemblies (roots, unknowns) from which those of designs start, and how many assemblies a
+        search finds."""
+        starts_of_blocks = []
         nodes: list[tuple[float, Array]] = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
         for block in self.solver.equations.blocks:
-            ways = []
+            extensions = []
             for cost, z in nodes:
-                found, nearest = candidates.near_sketch(block, z, every=True)
-                ways.append([(cost + each.distance, each.z) for each in found] or [(cost + 1e3, nearest)])
-            most = max(ways, key=len)
-            starts = [z[block.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
+                assemblies, nearest = self.candidates.near_sketch(block, z, every=True)
+                extended = [(cost + assembly.distance, assembly.z) for assembly in assemblies]
+                extensions.append(extended or [(cost + 1e3, nearest)])
+            longest = max(extensions, key=len)
+            nearest_first = sorted((*longest, *extensions[0]), key=lambda node: node[0])
+            starts = [z[block.unknowns] for _, z in nearest_first]
             apart = [
                 z for k, z in enumerate(starts) if all(np.max(np.abs(z - o), initial=0.0) > 1e-6 for o in starts[:k])
             ]
-            yield np.array(apart[:MAX_ROOTS]), len(most)
-            nodes = sorted((each for way in ways for each in way), key=lambda each: each[0])[:MAX_ROOTS]
+            starts_of_blocks.append((np.array(apart[:MAX_ROOTS]), len(longest)))
+            nodes = sorted(chain.from_iterable(extensions), key=lambda node: node[0])[:MAX_ROOTS]
+        return tuple(starts_of_blocks)
 
 
 class DesignFormula:
@@ -310,6 +287,8 @@ class DesignFormula:
         input_count = len(reference.mechanism.inputs)
         self.sections = [self.pair_number_count + k * input_count for k in range(4)]
         "where the rows of u, u1 and u2 begin among those of `_rows`, and where they end"
+        self.varying_zero_rows = list(reference.zero_rows)
+        "the rows of p that are zero in the reference and may not be in a design"
         self.function: FormulaFunction | None = None
         "of the rows that are computed; None where a pair has numbers that are measured in floats alone"
         self.coordinates: list[float | int] = []
@@ -319,8 +298,10 @@ class DesignFormula:
 
     def _record(self) -> None:
         formula = record_formula(self._rows, len(self.names))
-        point_row = self.sections[-1] + 2
+        point_row = self.sections[-1] + JUDGED_ROWS
         computed = list(formula.results[:point_row])
+        is_zero = [(made.operation, made.number) == ("const", 0.0) for made in formula.instructions]
+        self.varying_zero_rows = [row for row in self.varying_zero_rows if not is_zero[computed[row]]]
         for number in formula.results[point_row:]:
             operation, _, constant, argument = formula.instructions[number]
             if operation == "const":
@@ -336,8 +317,9 @@ class DesignFormula:
 
     def _rows(self, values: Sequence[Scalar]) -> list[Scalar]:
         """The rows of designs with these values of the named numbers, in any arithmetic: p; positions, velocities and
-        accelerations of the inputs; a margin that is negative where an arm is short; the sum of all other rows, which
-        is finite where they are; and x and y of the points of the changed links."""
+        accelerations of the inputs; a margin that is negative where an arm is short; the sum of all these rows and of
+        the points, which is finite where they are; the greatest length of a pair, in sizes; and x and y of the points
+        of the changed links."""
         reference = self.reference
         design = with_design_values(reference.mechanism, dict(zip(self.names, values, strict=True)))
         shapes = reference.shapes(design)
@@ -356,12 +338,14 @@ class DesignFormula:
             # an arm of no length at all turns nothing
             margin = least_of(margin, greatest_of(square - SHORT_ARM**2 * squared_size, -square))
         coordinates = [part for link in self.changed_links for point in shapes[link].points.values() for part in point]
-        return [*rows, margin, sum([*rows, *coordinates]), *coordinates]
+        lengths = [abs(rows[k]) for k in reference.length_rows]
+        reach = reduce(greatest_of, lengths, 0.0)
+        return [*rows, margin, sum([*rows, *coordinates]), reach, *coordinates]
 
     def rows(self, values: Mapping[str, Array], count: int) -> DesignRows:
         """The rows of designs with these values (designs,) by name."""
         arguments = [values[name] for name in self.names]
-        point_row = self.sections[-1] + 2
+        point_row = self.sections[-1] + JUDGED_ROWS
         with np.errstate(all="ignore"):  # what cannot be placed is not a number
             if self.function is None:
                 every = self._rows(arguments)
@@ -370,13 +354,18 @@ class DesignFormula:
                 rows = self.function.evaluate_entries(count, *(argument[None] for argument in arguments))
                 known = [*arguments, *rows]
                 coordinates = iter(known[part] if isinstance(part, int) else part for part in self.coordinates)
-        p, u, u1, u2, (margin, total), _ = np.split(rows, [*self.sections, point_row])
+        rows = np.ascontiguousarray(rows)
+        sections = zip([0, *self.sections], self.sections, strict=False)
+        p, u, u1, u2 = (rows[first:last] for first, last in sections)
+        margin, total, reach = rows[self.sections[-1] : point_row]
         shapes = dict(self.reference.solver.shapes)
         for link in self.changed_links:
             shape = shapes[link]
             points = {name: Vector(next(coordinates), next(coordinates)) for name in shape.points}
             shapes[link] = LinkShape(points, shape.origin, shape.axis)
-        return DesignRows(p, u, u1, u2, shapes, (margin >= 0.0) & np.isfinite(total))
+        tolerance = residual_tolerance(len(self.reference.mechanism.links), np.fmax.reduce(reach, initial=0.0))
+        zero_rows = None if any(p[k].any() for k in self.varying_zero_rows) else self.reference.zero_rows
+        return DesignRows(p, u, u1, u2, shapes, (margin >= 0.0) & np.isfinite(total), float(tolerance), zero_rows)
 
 
 @lru_cache(maxsize=16)
@@ -393,18 +382,16 @@ def stack_rows(rows: Sequence[Array | Scalar], design_count: int) -> Array:
     return stacked
 
 
-def shape_of_design(whole: LinkShape, index: int) -> LinkShape:
+def shape_of_design(shape: LinkShape, index: int) -> LinkShape:
     """The shape of one design, out of that of all."""
-    return _map_shape(whole, lambda part: float(part[index]))
+    return _map_shape(shape, lambda part: float(part[index]))
 
 
-def shape_of_designs(whole: LinkShape, which: Array) -> LinkShape:
-    """The shapes of some designs, out of those of all."""
-    return _map_shape(whole, lambda part: part[which])
+def _map_shape(shape: LinkShape, select: Callable[[Array], Scalar]) -> LinkShape:
+    """The shape of some designs, out of that of all."""
 
+    def of_designs(value: Vector) -> Vector:
+        return Vector(*(select(part) if isinstance(part, np.ndarray) else part for part in value))
 
-def _map_shape(whole: LinkShape, of: Callable[[Array], Scalar]) -> LinkShape:
-    def own(value: Vector) -> Vector:
-        return Vector(*(of(part) if isinstance(part, np.ndarray) else part for part in value))
-
-    return LinkShape({name: own(at) for name, at in whole.points.items()}, own(whole.origin), own(whole.axis))
+    points = {name: of_designs(place) for name, place in shape.points.items()}
+    return LinkShape(points, of_designs(shape.origin), of_designs(shape.axis))

@@ -220,8 +220,8 @@ def sweep(  # many: the public signature; # long: its docstring
     if derivatives:
         results = _with_derivatives(common, results, names, derivatives, rates)
     if reductions is not None:
-        own, rates = reductions.with_points(names, rates)
-        names = own or ()
+        reduced_names, rates = reductions.with_points(names, rates)
+        names = reduced_names or ()
     warn_of_backend(backend, "sweep", 5)
     if assemblies not in ("nearest", "all"):
         raise BadInput("assemblies", f"choose from nearest, all; there is no {assemblies!r:.40}")
@@ -229,20 +229,19 @@ def sweep(  # many: the public signature; # long: its docstring
     if listed is not None:
         values = {name: array[listed.design] for name, array in values.items()}
     z = listed and listed.z
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, z, number_type)
-    many = len(next(iter(values.values())))
-    kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
+    all_designs = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, z, number_type, duration)
+    kind = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
     width = len(names) + 2 * len(mechanism.links) * any(results)
     width += len(results.derivatives) * (len(names) + len(results.links) + len(results.pairs))
-    size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
-    plan = SweepPlan(whole, size, results, listed, duration)
+    size = int(block) if block is not None else _block_size(all_designs, width, executor, kind)
+    plan = SweepPlan(all_designs, size, results, listed)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
     for done in _solve_blocks(into, threads, executor, reductions):
-        report_progress(done, many)
+        report_progress(done, all_designs.design_count)
         if progress is not None:
-            progress(done, many)
-    found: Sweep | ReducedSweep = into.result()
-    return found
+            progress(done, all_designs.design_count)
+    result: Sweep | ReducedSweep = into.result()
+    return result
 
 
 def _solve_blocks(
@@ -251,16 +250,14 @@ def _solve_blocks(
     """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
     plan = into.plan
     parts = list(split_into_blocks(plan.design_count, plan.block_size))
-    whole = plan.all_designs
+    all_designs = plan.all_designs
     missing = {k: part for k, part in enumerate(parts) if k not in into.finished}
     ready = plan.design_count - sum(part.stop - part.start for part in missing.values())
     if ready:
         yield ready
 
     def task(part: slice) -> ResultBlock:
-        z = None if whole.assemblies is None else whole.assemblies[:, part]
-        own = {name: array[part] for name, array in whole.designs.items()}
-        return ResultBlock(whole._replace(designs=own, assemblies=z), plan.results, plan.duration)
+        return ResultBlock(all_designs.select(part), plan.results)
 
     def solve_here(number: int, block: ResultBlock) -> Any:
         if reductions is not None:
@@ -353,15 +350,16 @@ def _with_derivatives(
     return found
 
 
-def _block_size(whole: DesignBlock, width: int, many: int, executor: Executor | None, kept: str) -> int:
-    """How many designs make a block of so many points, `kept` as in MAX_BLOCK_BYTES; in threads that hangs on the work
-    alone, so that results do."""
-    itemsize = 8 if kept == "reduced" else np.dtype(whole.dtype).itemsize
-    each = (whole.steps + 1) * 2 * max(width, 1) * (3 if whole.rates else 1) * itemsize
+def _block_size(designs: DesignBlock, width: int, executor: Executor | None, kind: str) -> int:
+    """How many designs make a block of so many points, `kind` as in MAX_BLOCK_BYTES; in threads that depends on the
+    work alone, so that results do."""
+    count, positions = designs.design_count, designs.steps + 1
+    itemsize = 8 if kind == "reduced" else np.dtype(designs.dtype).itemsize
+    design_bytes = positions * 2 * max(width, 1) * (3 if designs.rates else 1) * itemsize
     if executor is not None:
-        size = min(MAX_EXECUTOR_BLOCK_BYTES // each, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
+        size = min(MAX_EXECUTOR_BLOCK_BYTES // design_bytes, ceil(count / (TASKS_PER_WORKER * worker_count(executor))))
     else:
-        least, most = (positions // (whole.steps + 1) for positions in (MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS))
-        size = max(1, min(max(ceil(many / USUAL_BLOCKS), least), most, MAX_BLOCK_BYTES[kept] // each))
-        size = ceil(many / ceil(many / size))
-    return min(many, ceil(max(1, size) / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
+        minimum, maximum = MIN_BLOCK_POSITIONS // positions, MAX_BLOCK_POSITIONS // positions
+        size = max(1, min(max(ceil(count / USUAL_BLOCKS), minimum), maximum, MAX_BLOCK_BYTES[kind] // design_bytes))
+        size = ceil(count / ceil(count / size))
+    return min(count, ceil(max(1, size) / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)

@@ -24,7 +24,7 @@ def mechanism_of(case):
 
 
 def drawn(mechanism, spread, many):
-    """Lengths of designs about a mechanism's own; its reference design, its designs' shapes, p and u."""
+    """Lengths of designs about a mechanism's own; its reference design, its designs' rows."""
     rng, common = np.random.default_rng(1), reference_design(mechanism, mechanism.inputs[0].pair)
     values = {
         each.name: each.value * (1.0 + spread * rng.uniform(-1.0, 1.0, many))
@@ -32,16 +32,17 @@ def drawn(mechanism, spread, many):
         if each.value
     }
     rows = common.design_rows(values, many)
-    return values, common, rows.shapes, rows.p, rows.u
+    return values, common, rows
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_wide_designs_have_the_assemblies_of_the_complete_list(case):
     mechanism = mechanism_of(case)
-    values, common, _, p, u = drawn(mechanism, 0.3, 4)
+    values, common, rows = drawn(mechanism, 0.3, 4)
+    p = rows.p
     block = common.functions.equations.blocks[0]
     z = np.zeros((len(common.functions.equations.unknowns), 4))
-    found = BlockListing(common, block).assemblies({"p": p, "u": u, "z": z})
+    found = BlockListing(common, block).assemblies({"p": p, "u": rows.u, "z": z})
     assert found.is_complete[np.isfinite(p).all(axis=0)].mean() > 0.8
     for index in np.flatnonzero(found.is_complete):
         design = PositionSolver(with_design_values(common.mechanism, values_of_design(values, index)))
@@ -56,10 +57,10 @@ def test_wide_designs_have_the_assemblies_of_the_complete_list(case):
 
 def test_of_all_assemblies_the_nearest_is_taken_and_none_where_none_is():
     mechanism = planar.load("stephenson-3-five-bar")
-    values, common, shapes, p, u = drawn(mechanism, 0.4, 24)
-    found = find_assemblies(common, shapes, p, u)
+    values, common, rows = drawn(mechanism, 0.4, 24)
+    found = find_assemblies(common, rows)
     refused = found.failed_block == 0
-    assert np.all(found.is_sure | refused | ~np.isfinite(p).all(axis=0))
+    assert np.all(found.is_sure | refused | ~np.isfinite(rows.p).all(axis=0))
     assert np.any(refused)
     for index in [*np.flatnonzero(refused)[:2], *np.flatnonzero(found.is_sure)[:4]]:
         nearest = PositionSolver(with_design_values(common.mechanism, values_of_design(values, index))).nearest()

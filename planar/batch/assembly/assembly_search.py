@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import reduce
 from typing import NamedTuple
 
@@ -17,14 +17,13 @@ from planar.batch.assembly.assembly_scores import (
     is_clearly_regular,
 )
 from planar.batch.march.checks import column_volume
-from planar.batch.reference_design import ReferenceDesign, shape_of_designs
+from planar.batch.reference_design import DesignRows, ReferenceDesign
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.geometry import Vector
-from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import (
     CLEAR_SKETCH_DISTANCE,
     MEETING_COSINE_SQUARED,
@@ -220,15 +219,16 @@ find the nearest where that lies far from the sketch."""
 
 
 class AssemblySearch:
-    def __init__(self, base: ReferenceDesign, shapes: Mapping[str, LinkShape], p: Array, u: Array):
-        self.reference, self.shapes, self.p, self.u = base, shapes, p, u
+    def __init__(self, base: ReferenceDesign, rows: DesignRows):
+        p, u = rows.p, rows.u
+        self.reference, self.rows, self.p, self.u = base, rows, p, u
         self.equations, self.functions = base.functions.equations, base.functions
         self.design_count = p.shape[1]
         self.candidates = base.candidates
         unit = base.unit
         self.local_points = {
             name: {point: Vector(place.x / unit, place.y / unit) for point, place in shape.points.items()}
-            for name, shape in shapes.items()
+            for name, shape in rows.shapes.items()
         }
         ends = np.cumsum([len(pair.number_kinds) for pair in base.mechanism.pairs])
         self.numbers = dict(zip(self.candidates.pairs, np.split(p, ends[:-1]), strict=True))
@@ -251,8 +251,7 @@ class AssemblySearch:
         cost = np.where(joined.exists, joined.distance, np.inf).min(axis=1)
         again = np.flatnonzero(is_hasty & ~is_at_sketch(cost, self.sketched_point_count))
         if again.size:
-            shapes = {name: shape_of_designs(shape, again) for name, shape in self.shapes.items()}
-            slow = AssemblySearch(self.reference, shapes, self.p[:, again], self.u[:, again])
+            slow = AssemblySearch(self.reference, self.rows.select(again))
             slow_chosen = slow._choose(slow._join_blocks(False)[0])
             chosen.z[:, again], chosen.is_sure[again], chosen.failed_block[again] = slow_chosen[:3]
         return chosen
@@ -263,7 +262,7 @@ class AssemblySearch:
         unknowns = len(self.equations.unknowns)
         zero = np.zeros((self.design_count, 1))
         partial = PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
-        for block, (roots, base_count) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
+        for block, (roots, base_count) in zip(self.equations.blocks, self.reference.block_assemblies, strict=True):
             if slice_length(block.rows):
                 clear, extended = np.zeros(0, dtype=int), partial
                 if quick:

@@ -99,16 +99,15 @@ class ClosedFormDesigns:
         return out, passed
 
 
-def closed_form_designs(batch: DesignBatch, index: int, signs: Array | None) -> ClosedFormDesigns | None:
-    """Designs of a batch at their start, where `index` is the input that runs; None where a block has no closed form.
-
-    signs (blocks, designs) of the blocks' assemblies, 0 where that is not known.
-    """
-    if signs is None or links_counting_turns(batch.mechanism):
+def closed_form_designs(batch: DesignBatch, index: int) -> ClosedFormDesigns | None:
+    """Designs of a batch at their start, where `index` is the input that runs; None where a block has no closed form,
+    or nothing is known of the signs of the assemblies."""
+    if batch.signs is None or links_counting_turns(batch.mechanism):
         return None
     joiner = find_joiner(batch, None)
     if joiner is None:
         return None
+    signs = batch.signs.copy()
     unknown = np.flatnonzero(~signs.all(axis=0))
     if unknown.size:
         rows = (values[:, unknown] for values in (batch.z0, batch.u0, batch.p))

@@ -7,28 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, solve_design_block, status_code
-from planar.batch.design_arrays import design_variables, split_into_blocks, values_of_design, with_design_values
-from planar.batch.general_path import link_angles, solve_timed_design
-from planar.batch.initial_assembly import find_assemblies, given_assemblies
+from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, input_motions
+from planar.batch.design_arrays import split_into_blocks, with_design_values
+from planar.batch.general_path import link_angles
 from planar.batch.march.prediction import LONGEST_STEP
-from planar.batch.march.runs import run_designs
 from planar.batch.named_results.design_forces import find_forces, output_link
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, NamedArrays, RequestedResults
-from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.arrays import Array, BoolArray, IntArray
-from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Vector
-from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import take_turn
-from planar.model.link_shapes import LinkPlace, place_in_link
-from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
+from planar.model.link_shapes import LinkPlace
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.runs.continuous_run import input_law_rates
 
 LEAST_STROKE_STEPS = 24
 """Steps of a stroke between limits of its own, so that they show how links turn."""
@@ -37,39 +30,35 @@ MAX_PART_POSITIONS = 2**15
 
 
 class ResultBlock(NamedTuple):
-    """A block that is to be solved, the results that are wanted beside those of its points, and how long (s) a run in
-    time takes; `slopes_by_places` (steps + 1, designs): where derivatives follow from the places of links, of a block
-    whose other derivatives are known."""
+    """A block that is to be solved, and the results that are wanted beside those of its points; `slopes_by_places`
+    (steps + 1, designs): where derivatives follow from the places of links, of a block whose other derivatives are
+    known."""
 
     designs: DesignBlock
     results: RequestedResults
-    duration: float | None = None
     slopes_by_places: BoolArray | None = None
 
 
 def solve_result_block(block: ResultBlock, out: Array | None = None) -> SolvedDesigns:
-    """As `solve_design_block`; the rows of the results stand after those of the points."""
-    if not any(block.results):
-        if block.duration is not None:
-            with take_turn():
-                return _TimedBlockSolver(block.designs, block.duration).solve()
-        return solve_design_block(block.designs, out)
+    """Solve a block, in `out` if that is given; the rows of the results stand after those of the points."""
     with take_turn():
+        if not any(block.results):
+            return DesignBlockSolver(block.designs, out).solve()
         return _ResultBlockSolver(block).solve(out)
 
 
 class _ResultBlockSolver:
     def __init__(self, block: ResultBlock, marches_slopes: bool = True):
-        self.block, self.results, self.duration = block.designs, block.results, block.duration
-        timed = block.duration is not None
-        self.reference: ReferenceDesign = reference_design(self.block.mechanism, self.block.pair, timed)
+        self.block, self.results = block.designs, block.results
+        is_timed = self.block.duration is not None
+        self.reference = self.block.reference()
         self.mechanism, self.arm = self.reference.mechanism, self.reference.unit
-        self.design_count = len(next(iter(self.block.designs.values())))
+        self.design_count = self.block.design_count
         self.slopes = (
             design_slopes(self.reference, self.results, self.block.rates) if self.results.derivatives else None
         )
         self.slopes_at = block.slopes_by_places
-        self.marches_slopes = marches_slopes and self.slopes is not None and not timed and self.slopes_at is None
+        self.marches_slopes = marches_slopes and self.slopes is not None and not is_timed and self.slopes_at is None
         "whether derivatives are told by machine code, and not by the places of links"
         by_places = self.slopes is not None and not self.marches_slopes
         self.links = self._needed_links(by_places)
@@ -96,12 +85,8 @@ class _ResultBlockSolver:
         asked = block._replace(
             points=(*block.points, *places), rates=self.rates, steps=block.steps * refined, dtype="float64"
         )
-        march = marched = None
-        if self.duration is not None:
-            done = _TimedBlockSolver(asked, self.duration).solve()
-        else:
-            solver = DesignBlockSolver(asked, None)
-            done, march = solver.solve(), solver.march
+        solver = DesignBlockSolver(asked, None)
+        done, march, marched = solver.solve(), solver.march, None
         if self.slopes is not None and self.marches_slopes:
             marched = None if march is None else self.slopes.march_block(asked, march, done)
             if marched is None:  # machine code cannot do that
@@ -117,7 +102,7 @@ class _ResultBlockSolver:
         parts = split_into_blocks(self.design_count, max(1, MAX_PART_POSITIONS // len(done.out)))
         for part in parts if self.links else ():
             inputs = done.input if done.input.ndim == 1 else done.input[part]
-            solved = _SolvedPart(part, _select_designs(block, part), done.status[part], inputs)
+            solved = _SolvedPart(part, block.select(part), done.status[part], inputs)
             frames = self._frames(solved, np.moveaxis(places_out[:, :, point_rows:, part], 1, 0))
             unclear = np.flatnonzero(~frames.is_clear & (solved.status[:, 0] == 0))
             if unclear.size:
@@ -143,9 +128,9 @@ class _ResultBlockSolver:
         self.slopes.write_free(slopes, slope_rows)
         designs = np.flatnonzero(is_missing.any(axis=0))
         if designs.size:
-            block = _select_designs(self.block, designs)._replace(points=())
+            block = self.block.select(designs)._replace(points=())
             results = self.results._replace(outputs=(), efforts=(), reactions=())
-            others = solve_result_block(ResultBlock(block, results, None, is_missing[:, designs])).out
+            others = solve_result_block(ResultBlock(block, results, is_missing[:, designs])).out
             known = slope_rows[:, :, designs]
             slope_rows[:, :, designs] = np.where(
                 is_missing[:, None, designs], others[:, others.shape[1] - count :], known
@@ -154,9 +139,8 @@ class _ResultBlockSolver:
     def _refinement(self) -> int:
         """Into how many a step is divided, so that it shows how far links turn."""
         block, base_ = self.block, self.reference
-        if self.duration is not None:
-            time = np.linspace(0.0, self.duration, block.steps + 1)
-            timed = input_motions(self.mechanism, block, time)[0]
+        if block.duration is not None:
+            timed = input_motions(self.mechanism, block, block.time)[0]
             moved = np.abs(np.diff(timed, axis=1)) / base_.input_scale[:, None, None]
             return max(1, ceil(float(np.max(moved)) / LONGEST_STEP - 1e-9))
         if base_.is_sliding and block.stop is None:
@@ -171,7 +155,7 @@ class _ResultBlockSolver:
         """Frames of the links out of rows (orders, steps + 1, rows, designs) of places."""
         base_, shape = self.reference, (rows.shape[1], rows.shape[3])
         designs = with_design_values(self.mechanism, part.block.designs)
-        if self.duration is not None:
+        if self.block.duration is not None:
             timed = input_motions(self.mechanism, part.block, part.input)[0]
             inputs = {driven.pair: position for driven, position in zip(designs.inputs, timed, strict=True)}
         else:
@@ -186,7 +170,7 @@ class _ResultBlockSolver:
             link: (rows[:, :, 4 * k : 4 * k + 2], rows[:, :, 4 * k + 2 : 4 * k + 4])
             for k, link in enumerate(self.links)
         }
-        time = None if self.duration is None else part.input
+        time = None if self.block.duration is None else part.input
         shapes = base_.design_rows(part.block.designs, shape[1]).shapes
         return DesignFrames(designs, shapes, inputs, places, self.arm, time)
 
@@ -201,9 +185,9 @@ class _ResultBlockSolver:
 
     def _motion(self, part: _SolvedPart, index: int, steps: int) -> Motion:
         """The motion of one design, by itself."""
-        mechanism = _single_design(self.reference, part.block, index)
-        if self.duration is not None:
-            return cycle(mechanism, steps, duration=self.duration)
+        mechanism = part.block.single_design(index)
+        if self.block.duration is not None:
+            return cycle(mechanism, steps, duration=self.block.duration)
         if self.reference.is_sliding and self.block.stop is None:
             return cycle(mechanism, steps, self.block.start, None, self.reference.pair)
         grid = part.input if part.input.ndim == 1 else part.input[index]
@@ -251,113 +235,3 @@ class _SolvedPart(NamedTuple):
     block: DesignBlock
     status: Array
     input: Array
-
-
-def _select_designs(block: DesignBlock, which: slice | IntArray) -> DesignBlock:
-    """Some designs of a block."""
-    designs = {name: np.asarray(value)[which] for name, value in block.designs.items()}
-    return block._replace(designs=designs, assemblies=None if block.assemblies is None else block.assemblies[:, which])
-
-
-def _single_design(reference: ReferenceDesign, block: DesignBlock, index: int) -> Mechanism:
-    """One design of a block, with a sketch of its assembly where that is given."""
-    design = with_design_values(reference.mechanism, values_of_design(block.designs, index))
-    if block.assemblies is None:
-        return design
-    u = reference.design_rows(block.designs, block.assemblies.shape[1]).u[:, index]
-    return reference.with_sketch_of(design, block.assemblies[:, index], u)
-
-
-def input_motions(mechanism: Mechanism, block: DesignBlock, time: Array) -> Array:
-    """Positions, first and second rates of the inputs (3, inputs, steps + 1, designs) of designs at times (steps + 1,)
-    (SI)."""
-    count = len(next(iter(block.designs.values())))
-    variables = design_variables(mechanism)
-    of_inputs = {name: value for name, value in block.designs.items() if variables[name].path[0] == "inputs"}
-    designs = [
-        with_design_values(mechanism, values_of_design(of_inputs, index)) for index in range(count if of_inputs else 1)
-    ]
-    rates = np.array([[input_law_rates(driven, time)[:3] for driven in design.inputs] for design in designs])
-    rates = rates.transpose(2, 1, 3, 0)
-    return np.broadcast_to(rates, (*rates.shape[:3], count))
-
-
-class _TimedBlockSolver:
-    """Solves a block in time (s); `input` are the times (steps + 1,).
-
-    Designs whose inputs move alike go side by side where only positions are wanted, or where all inputs keep their
-    speed; all others, and those that come to a dead point, by the general path.
-    """
-
-    def __init__(self, block: DesignBlock, duration: float):
-        self.block, self.duration = block, duration
-        self.reference: ReferenceDesign = reference_design(block.mechanism, None, True)
-        self.design_count = len(next(iter(block.designs.values())))
-        self.time = np.linspace(0.0, duration, block.steps + 1)
-
-    def solve(self) -> SolvedDesigns:
-        """See `solve_design_block`."""
-        block, count = self.block, self.design_count
-        orders = 3 if block.rates else 1
-        out = allocate_aligned(block.steps + 1, 2 * len(block.points) * orders, count, block.dtype)
-        status = np.zeros((count, block.steps + 1), dtype=np.int8)
-        solved_steps = self._run_compiled(out.reshape(len(out), orders, len(block.points), 2, count))
-        general_positions, endings = 0, dict[int, tuple[int, str | NoAnswer]]()
-        others = np.flatnonzero(solved_steps <= block.steps).tolist()
-        for index in others:
-            mechanism = _single_design(self.reference, block, index)
-            solved = solve_timed_design(mechanism, self.duration, block.steps, block.points, block.rates)
-            out[:, :, index], status[index] = solved.out, solved.status
-            general_positions += int(np.sum(solved.status == 0))
-            sentences = (int(solved.status[-1]), solved.message), (status_code(Outcome.SOLVED), solved.rate_remark)
-            for code, sentence in sentences:
-                if sentence:
-                    number, first = endings.get(code, (0, sentence))
-                    endings[code] = number + 1, first
-        ends = tuple((code, *ending) for code, ending in endings.items())
-        unknown = np.full((2, count), np.nan)
-        return SolvedDesigns(out, status, self.time, general_positions, len(others), ends, *unknown)
-
-    def _run_compiled(self, out: Array) -> IntArray:
-        """Fill out (steps + 1, orders, points, 2, designs) as far as it runs compiled; how many steps passed
-        (designs,)."""
-        base_, block = self.reference, self.block
-        solved_steps: IntArray = np.zeros(self.design_count, dtype=int)
-        if not base_.can_be_compiled or base_.mechanism.stops:
-            return solved_steps
-        design_rows = base_.design_rows(block.designs, self.design_count)
-        p, shapes = design_rows.p, design_rows.shapes
-        u, u1, u2 = input_motions(base_.mechanism, block, self.time) / base_.input_scale[:, None, None]
-        if block.assemblies is None:
-            start = find_assemblies(base_, shapes, p, design_rows.u)
-        else:
-            start = given_assemblies(block.assemblies)
-        fit = start.is_sure & design_rows.is_fit & ~base_.is_unfit(block.designs, shapes)
-        fit &= np.abs(u).max(axis=(0, 1)) <= LARGEST_INPUT_POSITION
-        if block.rates:
-            fit &= np.all((np.ptp(u1, axis=1) == 0.0) & np.all(u2 == 0.0, axis=1), axis=0)
-        members = [base_.point_member(name) for name in block.points]
-        moving = [k for k, (link, _) in enumerate(members) if link != base_.mechanism.frame]
-        inputs = u[:, 0], u1[:, 0], u2[:, 0]
-        march = base_.design_batch(shapes, p, inputs, [members[k] for k in moving], block.rates)._replace(z0=start.z)
-        offsets = (u - u[:, :1]).transpose(1, 0, 2)  # (steps + 1, inputs, designs)
-        which = np.flatnonzero(fit)
-        if not which.size:
-            return solved_steps
-        courses = np.unique(offsets[:, :, which].reshape(-1, which.size), axis=1, return_inverse=True)[1].ravel()
-        rows = allocate_aligned(len(out), march.output_row_count, self.design_count)
-        try:
-            for course in range(int(courses.max()) + 1):
-                alike = which[courses == course]
-                part = march.select(alike)._replace(input_offsets=np.ascontiguousarray(offsets[:, :, alike[0]]))
-                part_rows = allocate_aligned(len(out), march.output_row_count, alike.size)
-                solved_steps[alike] = run_designs(part, part_rows)
-                rows[:, :, alike] = part_rows
-        except UnsupportedOperation:
-            return np.zeros_like(solved_steps)
-        out[:] = 0.0
-        out[:, :, moving] = rows.reshape(len(out), out.shape[1], len(moving), 2, self.design_count)
-        for k, (link, point) in enumerate(members):
-            if k not in moving:
-                out[:, 0, k, 0], out[:, 0, k, 1] = place_in_link(shapes[link], point)
-        return solved_steps

@@ -406,10 +406,8 @@ def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[PointM
     Raises UnsupportedOperation where its assembly is not sure, or does not come to the end.
     """
     rows = reference.design_rows({}, 1)
-    start = find_assemblies(reference, rows.shapes, rows.p, rows.u)
-    batch = reference.design_batch(rows.shapes, rows.p, (rows.u, rows.u1, rows.u2), members)._replace(
-        z0=start.z, input_offsets=u - u[0]
-    )
+    start = find_assemblies(reference, rows)
+    batch = reference.design_batch(rows, members)._replace(z0=start.z, input_offsets=u - u[0])
     good = run_designs(batch, allocate_aligned(len(u), batch.output_row_count, 1))
     if not start.is_sure[0] or good[0] < len(u):
         raise UnsupportedOperation("the file's own design does not run to the end")
@@ -420,7 +418,7 @@ def _assembly_lanes(reference: ReferenceDesign, equations: KernelEquations) -> t
     """The assemblies of the file's design (unknowns, lanes): the first nearest to the sketch, then others of one block
     after the other, while there are lanes; how many assemblies each block has, and the lanes of its other ones."""
     blocks = reference.functions.equations.blocks
-    lists = {block.block_index: each for block, each in zip(blocks, reference.block_assemblies(), strict=True)}
+    lists = {block.block_index: each for block, each in zip(blocks, reference.block_assemblies, strict=True)}
     start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in lists.values() if len(roots))])
     starts, lanes = [start], []
     for part in equations.blocks:

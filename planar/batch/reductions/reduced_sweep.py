@@ -167,9 +167,7 @@ def result_type(dtype: DTypeLike) -> str:
 def reduce_block(block: ResultBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
     """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
     designs = block.designs._replace(dtype="float64")
-    store = MemoryStore(
-        SweepPlan(designs, len(next(iter(designs.designs.values()))), block.results, duration=block.duration)
-    )
+    store = MemoryStore(SweepPlan(designs, designs.design_count, block.results))
     every = slice(0, store.plan.design_count)
     done = solve_result_block(block._replace(designs=designs), store.output_array(every))
     store.write_block(0, every, done)

@@ -43,12 +43,11 @@ class SweepPlan(NamedTuple):
     block_size: int
     results: RequestedResults = RequestedResults()
     assemblies: ListedAssemblies | None = None
-    duration: float | None = None
 
     @property
     def design_count(self) -> int:
         """How many designs there are."""
-        return len(next(iter(self.all_designs.designs.values())))
+        return self.all_designs.design_count
 
     @property
     def design_columns(self) -> dict[str, Array]:
@@ -98,7 +97,7 @@ class SweepPlan(NamedTuple):
         """The same for two sweeps that have the same results."""
         block, digest = self.all_designs, hashlib.sha256()
         grid = [block.steps, block.points, block.rates, block.start, block.stop, block.pair, block.dtype]
-        results = [self.results, self.assemblies is not None, self.duration]
+        results = [self.results, self.assemblies is not None, block.duration]
         sweep = [STORE_VERSION, to_dict(block.mechanism), grid, *results]
         digest.update(json.dumps(sweep, sort_keys=True, default=float).encode())
         for name, values in sorted(block.designs.items()):
