@@ -41,7 +41,8 @@ class ClosedForm(NamedTuple):
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
     `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None. `cosine`:
     that cosine itself, which changes sign between the two dead points and so varies as slowly as what holds the block;
-    None where an arm changes. `squared_lengths` (2,): of the Jacobian's columns.
+    None where an arm changes, for which `margin` is the square of the arm less that of the shortest that can be
+    assembled. `squared_lengths` (2,): of the Jacobian's columns.
     """
 
     values: tuple[tuple[ca.SX, ...], ...]
@@ -51,6 +52,7 @@ class ClosedForm(NamedTuple):
     squared_lengths: ca.SX
     squared_arm: ca.SX | None = None
     cosine: ca.SX | None = None
+    margin: ca.SX | None = None
 
 
 class _ComplexNumber(NamedTuple):
@@ -102,11 +104,12 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
         return None
     function, part_counts, has_arm = derived
     sign = ca.SX.sym("sign")
-    *results, lengths, arm, cosine = function(unknowns, others, sign)
+    *results, lengths, arm, slow = function(unknowns, others, sign)
     parts = iter(results)
     values = tuple(tuple(next(parts) for _ in range(count)) for count in part_counts)
     side, coalescence = parts
-    changing = (arm, None) if has_arm else (None, cosine)
+    # one function has both kinds: of the last number only one is asked for
+    changing = (arm, None, slow) if has_arm else (None, slow, None)
     return ClosedForm(values, sign, side, coalescence, lengths, *changing)
 
 
@@ -139,9 +142,11 @@ def _derive_form(formula: str, angles: tuple[bool, ...]) -> tuple[ca.Function, t
     if form is None:
         return None
     values = form.values[::-1] if first else form.values
-    arm, cosine = (ca.SX(0.0) if part is None else part for part in (form.squared_arm, form.cosine))
+    arm = ca.SX(0.0) if form.squared_arm is None else form.squared_arm
+    slow = form.cosine if form.margin is None else form.margin
+    assert slow is not None
     results = [*(part for value in values for part in value), form.sign_expression, form.coalescence]
-    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm, cosine)]
+    outputs = [ca.densify(result) for result in (*results, form.squared_lengths, arm, slow)]
     part_counts = tuple(len(value) for value in values)
     derived = ca.Function("form", [both, others, form.sign], outputs)
     return derived, part_counts, form.squared_arm is not None
@@ -207,7 +212,8 @@ def _solve_angle_and_length(rows: ca.SX, unknowns: list[ca.SX]) -> ClosedForm | 
         unit = (-(g + direction.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
-    changing = (None, gap / ca.sqrt(spanned)) if direction is fixed else (g.squared_length, None)
+    margin = reach.squared_length - gap * gap / direction.squared_length
+    changing = (None, gap / ca.sqrt(spanned)) if direction is fixed else (g.squared_length, None, margin)
     lengths = ca.vertcat(reach.squared_length, direction.squared_length)
     return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, lengths, *changing)
 

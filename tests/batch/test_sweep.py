@@ -192,11 +192,12 @@ def test_a_flipped_linkage_is_closed_and_does_not_pass():
 
 def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     solver = PositionSolver(four_bar(*ROCKER, 0.8))
-    p, z = np.repeat(solver.inputs.p[:, None], 3, axis=1), np.repeat(solver.find_assembly().z[:, None], 3, axis=1)
-    u = np.repeat(solver.inputs.u[:, None], 3, axis=1)
+    reference, z = reference_design(solver.mechanism, None), np.repeat(solver.find_assembly().z[:, None], 3, axis=1)
+    rows = reference.design_rows({}, 3)
+    p, u = rows.p.copy(), rows.u
     z[0, 1] += 1e-9
     p[-1, 2] += 1e-9
-    batch = reference_design(solver.mechanism, None).design_batch({}, p, (u, 0.0 * u, 0.0 * u), ())
+    batch = reference.design_batch(rows._replace(p=p), ())
     evaluation = DesignEvaluation(batch._replace(tolerance=solver.tolerance))
     assert evaluation.is_closed(evaluation.positions(z.T, u)).tolist() == [True, False, False]
 

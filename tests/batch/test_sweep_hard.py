@@ -241,3 +241,18 @@ def test_a_prepared_run_ends_at_a_gap_within_a_step():
     a, b, c, g, start = 0.99015, 0.44587, 0.32621, 0.94358, 6.08748
     run = planar.prepared(bare_four_bar(a, b, c, g, start), 13, "C", rates=False)()
     assert np.count_nonzero(np.asarray(run.status) == 0) == 1
+
+
+@pytest.mark.parametrize("steps", [9, 24])
+def test_an_arm_too_short_for_its_offset_between_two_steps_is_not_passed_over(steps):
+    """A guide at an offset from the pivot of its arm: where the crank's pin comes nearer than that, it comes apart."""
+    value = planar.to_dict(crank_and_slotted_arm(0.8))
+    value["links"]["arm"]["points"]["P"] = [0.0, 0.1]
+    value["pairs"][3]["line"]["through"] = "P"
+    rng, count = np.random.default_rng(steps), 500
+    offset, start = rng.uniform(0.03, 0.2, count), rng.uniform(-2.5, -0.7, count)
+    crank = 1.0 + offset * rng.uniform(-0.9, 0.9, count)
+    values = {"crank.length": crank, "arm.P.y": offset, "O.position": start}
+    swept = planar.sweep(planar.from_dict(value), values, steps, "A", rates=False)
+    turned = -np.arccos((crank**2 + 1.0 - offset**2) / (2.0 * crank)) - start
+    np.testing.assert_allclose(swept.dead_point - start, turned, atol=1e-8)

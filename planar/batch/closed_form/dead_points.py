@@ -151,8 +151,8 @@ class DeadPointWriter(BlockJoinWriter):
         return self.close_function("block")
 
     def _write_evaluation(self, start: OperandNames, sense: str) -> list[str]:
-        """How far, where the lanes look, every block's cosine is from one and from minus one, or its coalescence from
-        one, no number where an arm is short; then how far what reaches one where a pair meets its stop."""
+        """How far, where the lanes look, every block's cosine is from one and from minus one, or the margin of its
+        arm, no number where that is short; then how far what reaches one where a pair meets its stop."""
         t, values = self.ir, list[str]()
         offset = t.binary("mul", sense, t.load(self.pointers["place"]))
         names = start | {("u", self.index): t.binary("add", start["u", self.index], offset)}
@@ -161,14 +161,15 @@ class DeadPointWriter(BlockJoinWriter):
         for part in self.equations.blocks:
             form = part.closed_form
             assert form is not None
-            near = self.write_closed_form(part, names, as_cosine=True)
+            self.write_closed_form(part, names)
             if form.cosine is not None:
+                near = self.write_slow_nearness(part, names)
                 values += [t.binary(operation, t.constant(1.0), near) for operation in ("sub", "add")]
                 continue
+            assert form.margin is not None
             assert form.squared_arm is not None
-            near, arm = self.write_values([form.coalescence, form.squared_arm], names)
-            is_short = t.compare("olt", arm, t.constant(LEAST_ARM**2))
-            values.append(t.select(is_short, t.constant(nan), t.binary("sub", t.constant(1.0), near)))
+            margin, arm = self.write_values([form.margin, form.squared_arm], names)
+            values.append(t.select(t.compare("olt", arm, t.constant(LEAST_ARM**2)), t.constant(nan), margin))
         return [*values, *(t.binary("sub", t.constant(1.0), stop) for stop in self.write_stops(names))]
 
     def _write_changes(self, changes: list[tuple[ca.SX, Changes]], ranges: list[str], values: list[str]) -> None:

@@ -36,6 +36,7 @@ from planar.batch.march.prediction import (
 )
 from planar.codegen.llvm_linear import LinearSystems
 from planar.codegen.tape import LinkDirection, write_turn_check
+from planar.equations.closed_form import ClosedForm
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
@@ -250,17 +251,21 @@ class _DesignsKernelWriter(KernelWriter):
         """A block in closed form; flags that say where its two assemblies keep apart."""
         if self.request.point_blocks is not None:
             self._write_other_assembly(part, have)
-        near = self.write_closed_form(part, have, as_cosine=True)
+        form, coalescence = part.closed_form, self.write_closed_form(part, have)
+        assert form is not None
         for k in part.unknowns:
             if ("z", k) in self.carried:
                 self._write_carried_angle(k, have)
         if self.request.counts_candidates:
-            self.apart_here.append(self.write_apart_here(part, near, have))
-        assert part.closed_form is not None
+            self.apart_here.append(self.write_apart_here(part, coalescence, have))
         slots = self.bend_slots[self.sign_index[part.block.block_index]]
-        return [self._write_keeps_below(near, slots, part.closed_form.cosine is not None)]
+        flags = [self._write_keeps_below(self.write_slow_nearness(part, have), slots, form)]
+        if form.margin is not None:
+            regular = self.ir.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
+            flags.append(self.ir.compare("ole", coalescence, regular))
+        return flags
 
-    def _write_keeps_below(self, value: str, slots: Sequence[str], is_cosine: bool = False) -> str:
+    def _write_keeps_below(self, value: str, slots: Sequence[str], form: ClosedForm | None = None) -> str:
         """A flag: what reaches one at a dead point or a stop (a cosine: one or minus one) keeps below it, between steps
         too.
 
@@ -270,7 +275,7 @@ class _DesignsKernelWriter(KernelWriter):
         previous, earlier = (t.load(slot) for slot in slots)
         for slot, new in zip(slots, (value, previous), strict=True):
             t.store(new, slot)
-        return write_keeps_apart(t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), is_cosine)
+        return write_keeps_apart(t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), form)
 
     def _write_turns(self, have: OperandNames) -> list[str]:
         """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,

@@ -261,18 +261,28 @@ class KernelInstructions:
             for operand in ([("zc", k), ("zs", k)] if len(values) == 2 else [("z", k)])
         ]
 
-    def closed_form_outputs(self, part: KernelBlock, as_cosine: bool = False) -> list[ca.SX]:
-        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet; the cosine
-        in place of its square where it is asked for, and no arm changes.
+    def closed_form_outputs(self, part: KernelBlock) -> list[ca.SX]:
+        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet.
 
         An arm that shrinks to `LEAST_START_REGULARITY` counts as that too: what turns on it is not determined.
         """
         form = part.closed_form
         assert form is not None
-        near = form.coalescence if form.cosine is None or not as_cosine else form.cosine
+        near = form.coalescence
         if form.squared_arm is not None:
             near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
         return [*(value for values in form.values for value in values), near]
+
+    @staticmethod
+    def slow_nearness(part: KernelBlock) -> ca.SX:
+        """What varies as slowly as the links that hold a block in closed form, and reaches one (a cosine minus one too)
+        where its two assemblies meet."""
+        form = part.closed_form
+        assert form is not None
+        if form.cosine is not None:
+            return form.cosine
+        assert form.margin is not None
+        return 1.0 - form.margin
 
     def point_coordinates(self, points: Sequence[int]) -> ca.SX:
         """x and y of some of the points."""

@@ -9,9 +9,10 @@ from math import sqrt
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
-from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, MAX_TURN_PER_STEP
+from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, MAX_TURN_PER_STEP
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
+from planar.equations.closed_form import ClosedForm
 from planar.foundation.instruction_list import required_values
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
@@ -73,10 +74,9 @@ class KernelWriter(KernelInstructions):
         values = iter(self.write_values(outputs, names))
         return [[next(values) for _ in range(output.numel())] for output in outputs]
 
-    def write_closed_form(self, part: KernelBlock, names: OperandNames, as_cosine: bool = False) -> str:
-        """A block in closed form: its unknowns put into `names`, and how near its two assemblies are, see
-        `closed_form_outputs`."""
-        *values, coalescence = self.write_values(self.closed_form_outputs(part, as_cosine), names)
+    def write_closed_form(self, part: KernelBlock, names: OperandNames) -> str:
+        """A block in closed form: its unknowns put into `names`, and how near its two assemblies are."""
+        *values, coalescence = self.write_values(self.closed_form_outputs(part), names)
         names.update(zip(self.closed_form_operands(part), values, strict=True))
         return coalescence
 
@@ -91,9 +91,13 @@ class KernelWriter(KernelInstructions):
             return []
         return self.write_values([self.equations.stop_coalescences(self.symbols["stop"])], names)
 
-    def write_apart_here(self, part: KernelBlock, near: str, names: OperandNames) -> str:
-        """A flag: the two assemblies of a block are apart enough for a position, by its cosine or coalescence `near`,
-        and independent of what lies before it.
+    def write_slow_nearness(self, part: KernelBlock, names: OperandNames) -> str:
+        """See `slow_nearness`."""
+        (near,) = self.write_values([self.slow_nearness(part)], names)
+        return near
+
+    def write_apart_here(self, part: KernelBlock, coalescence: str, names: OperandNames) -> str:
+        """A flag: the two assemblies of a block are apart enough for a position, independent of what lies before it.
 
         Where no arm changes by what of its digits is lost, else as far as everywhere, less by more than rounding: where
         assemblies keep apart between steps too, this flag is up.
@@ -106,7 +110,7 @@ class KernelWriter(KernelInstructions):
             arm = ca.sqrt(ca.mmin(form.squared_lengths))
             arm_margin = ca.fmax(LEAST_CANDIDATE_REGULARITY**2, EPS / NEGLIGIBLE_ERROR / arm)
             (maximum,) = self.write_values([1.0 - ca.fmin(margin, arm_margin)], names)
-        return t.compare("ole", near if form.cosine is None else t.binary("mul", near, near), maximum)
+        return t.compare("ole", coalescence, maximum)
 
     def write_passed(self, flags: Sequence[str], slot: str) -> tuple[str, str]:
         """Two flags: all steps before passed, and this one by its own flags too, which is kept."""
@@ -175,10 +179,10 @@ def write_closes(t: IRWriter, residuals: Sequence[str], tolerance: str) -> str:
 
 
 def write_keeps_apart(
-    t: IRWriter, earlier: str, previous: str, current: str, is_known: str | None = None, is_cosine: bool = False
+    t: IRWriter, earlier: str, previous: str, current: str, is_known: str | None = None, form: ClosedForm | None = None
 ) -> str:
-    """A flag: over three positions, and between them, the two assemblies of a block keep apart, by its coalescence or
-    by its cosine.
+    """A flag: over three positions, and between them, the two assemblies of a block keep apart, by what reaches one
+    where they meet: of a closed form its `slow_nearness`.
 
     Between them it does not reach one, by half as much as it bends over all three. So it may be the position before at
     which a block had come too near, and the middle of its change may lie there, as where a run starts just before a
@@ -190,9 +194,11 @@ def write_keeps_apart(
     half = t.constant(0.5)
     if is_known is not None:
         half = t.select_or_zero(is_known, half)
-    if is_cosine:
+    if form is not None and form.cosine is not None:
         earlier, previous, current = (t.call_intrinsic("fabs", value) for value in (earlier, previous, current))
         maximum = sqrt(maximum)
+    elif form is not None:  # a margin says nothing of how regular a position is
+        maximum = 1.0 - LEAST_START_REGULARITY**2
     greatest = t.greater(earlier, t.greater(previous, current))  # NaN in `current` stays
     reached = t.binary("add", greatest, t.binary("mul", change, half))
     return t.compare("ole", reached, t.constant(maximum))

@@ -15,7 +15,7 @@ from typing import Any
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
 from planar.batch.march.kernel import KernelBlock, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
-from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, MAX_TURN_PER_STEP
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_code import (
     ALL_SOLVED,
@@ -171,10 +171,11 @@ class _PositionsWriter(KernelWriter):
             operand: self.load_entry(rows_of_inputs, k) for k, operand in enumerate(self.equations.input_operands)
         }
         have |= write_shifted_inputs(t, equations, inputs, have)
-        near = [
-            *(self.write_closed_form(part, have, as_cosine=True) for part in equations.blocks),
-            *self.write_stops(have),
-        ]
+        near: list[str] = []
+        for part, form in zip(equations.blocks, equations.closed_forms, strict=True):
+            coalescence = self.write_closed_form(part, have)
+            near += [self.write_slow_nearness(part, have), *([] if form.margin is None else [coalescence])]
+        near += self.write_stops(have)
         turns = [have[part, k] for k in equations.carrying_angles for part in ("zc", "zs")]
         residuals, angles, *orders = self.write_separately(
             [equations.residuals(), self.counted_angles(), *self.output_expressions()], have
@@ -244,12 +245,15 @@ class _PositionsWriter(KernelWriter):
             earlier, before, current = (self._load_before(row, back) for back in (2, 1, 0))
             row += 1
             # after a block that is open itself there is no number
-            is_cosine = form is not None and form.cosine is not None
-            keeps_apart = write_keeps_apart(t, earlier, before, current, is_cosine=is_cosine)
+            keeps_apart = write_keeps_apart(t, earlier, before, current, form=form)
+            if form is not None and form.margin is not None:
+                regular = t.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
+                keeps_apart = t.and_flags(keeps_apart, t.compare("ole", self._load_before(row, 0), regular))
+                row += 1
             is_known = t.or_flags(keeps_apart, t.compare("uno", current, current))
             is_known = t.or_flags(is_known, is_early)
             if form is None or form.squared_arm is None:
-                reached = t.binary("mul", current, current) if is_cosine else current
+                reached = current if form is None else t.binary("mul", current, current)
                 is_reached = t.compare("oge", reached, t.constant(CLEARLY_OPEN))
                 is_known = t.or_flags(is_known, is_reached)
                 is_beyond = t.or_flags(is_beyond, is_reached) if form is None else is_beyond
