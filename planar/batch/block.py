@@ -173,14 +173,15 @@ class DesignBlockSolver:
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
         rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
-        if rest or code.any():
+        # one number for all where there is no other, which takes no room
+        status: Array = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
+        early = np.flatnonzero(code)
+        if rest or early.size:
+            status = status.copy()
             # no wider than steps are counted: of all positions
             counter = np.min_scalar_type(-block.steps - 2)
-            status = (np.arange(block.steps + 1).astype(counter) >= solved.astype(counter)[:, None]).view(np.int8)
-            status *= code[:, None]
-        else:
-            # one number for all, which takes no room
-            status = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
+            is_beyond = np.arange(block.steps + 1).astype(counter) >= solved[early].astype(counter)[:, None]
+            status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
             int(number): (int(np.sum(code == number)), self._question(int(np.argmax(code == number)), inputs))
