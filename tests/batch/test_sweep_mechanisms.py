@@ -8,10 +8,10 @@ import pytest
 
 import planar
 from benchmarks import chain
+from planar.batch.march.prediction import LEAST_COSINE
 from planar.batch.mechanisms import partition
 from planar.batch.mechanisms.block_type import BlockPair, BlockSignature, find_block_type
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
-from planar.batch.mechanisms.tape_runs import LEAST_COSINE
 from planar.codegen import instructions, tape
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import reduce
 from itertools import chain
-from math import cos, inf, nan
+from math import inf, nan
 from typing import NamedTuple
 
 import casadi as ca
@@ -28,9 +28,9 @@ from planar.batch.march.kernel_writer import (
     write_turns_little,
 )
 from planar.batch.march.prediction import (
+    LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     LEAST_START_REGULARITY,
-    MAX_TURN_PER_STEP,
     PREDICTOR_ORDER,
     least_regularity,
 )
@@ -284,7 +284,7 @@ class _DesignsKernelWriter(KernelWriter):
             return []
         directions = [LinkDirection(have["zc", k], have["zs", k], None) for k in self.turn_slots]
         slots = [slot for both in self.turn_slots.values() for slot in both]
-        return [write_turn_check(self.ir, "splat (i1 true)", directions, slots, cos(MAX_TURN_PER_STEP))]
+        return [write_turn_check(self.ir, "splat (i1 true)", directions, slots, LEAST_COSINE)]
 
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import comb
+from math import comb, cos
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +11,8 @@ Array = np.ndarray
 
 MAX_TURN_PER_STEP = 0.5
 """rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
+LEAST_COSINE = cos(MAX_TURN_PER_STEP)
+"""Of the angle by which a link turns in a step."""
 LONGEST_STEP = 0.5
 """rad or sizes that an input may go in a step: positions that are farther apart do not show whether a block comes to a
 dead point between them."""

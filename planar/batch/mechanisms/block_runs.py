@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.prediction import LEAST_COSINE
 from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.block_type import (
     COS,
@@ -33,7 +34,6 @@ from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
     FIRST_ROOM_SLOT,
     FRAME,
-    LEAST_COSINE,
     POINT_ROWS,
     STEP_TABLE,
     TABLE,

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from planar.batch.march.kernel_writer import write_normalised
-from planar.batch.march.prediction import correction_limit, prediction_weights
+from planar.batch.march.prediction import LEAST_COSINE, correction_limit, prediction_weights
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, BlockType, rotate
-from planar.batch.mechanisms.tape_runs import LEAST_COSINE
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.tape import (

@@ -12,11 +12,11 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_surely_farther
+from planar.batch.march.prediction import LEAST_COSINE
 from planar.batch.mechanisms.block_type import write_formula
 from planar.batch.mechanisms.results import PointTable, pin_number
 from planar.batch.mechanisms.tape_runs import (
     FIRST_ROOM_SLOT,
-    LEAST_COSINE,
     POINT_ROWS,
     TABLE,
     TABLE_COS,

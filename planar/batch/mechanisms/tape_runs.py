@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from math import ceil, cos
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, padded_steps, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import Outcome
@@ -19,8 +18,6 @@ LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
 the steps of undecided linkages are divided again."""
 MAX_FINE_BYTES = 16 * 2**20
 """Maximum size in bytes of the result points at divided steps that are computed at once."""
-LEAST_COSINE = cos(MAX_TURN_PER_STEP)
-"""Of the angle by which a link turns in a step."""
 POINT_ROWS = {False: 2, True: 6}
 """Rows of a point, without and with rates: x and y, then their first rates, then the second ones."""
 TABLE, FRAME, STEP_TABLE = -1, -2, -3

@@ -9,13 +9,13 @@ what else there may be from below, since squared distances never fall as blocks 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, inf
+from math import inf
 from typing import Any
 
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
 from planar.batch.march.kernel import KernelBlock, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
-from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, MAX_TURN_PER_STEP
+from planar.batch.march.prediction import LEAST_COSINE, LEAST_KERNEL_REGULARITY, MAX_TURN_PER_STEP
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_code import (
     ALL_SOLVED,
@@ -268,7 +268,7 @@ class _PositionsWriter(KernelWriter):
         for turn_row in range(angle_rows.stop, angle_rows.stop + 2 * len(self.equations.carrying_angles), 2):
             parts = [[self._load_before(turn_row + part, back) for back in (0, 1)] for part in (0, 1)]
             along = t.add_all([t.binary("mul", *part) for part in parts])
-            is_near = t.compare("uge", along, t.constant(cos(MAX_TURN_PER_STEP)))
+            is_near = t.compare("uge", along, t.constant(LEAST_COSINE))
             is_sure = t.and_flags(is_sure, t.or_flags(is_near, is_first))
         is_closed = t.compare("ole", self._load_before(row, 0), tolerance)
         return t.and_flags(is_sure, t.or_flags(is_closed, is_open)), is_open, is_beyond
