@@ -197,7 +197,7 @@ class ReferenceDesign:
         return tuple(np.flatnonzero(pair_numbers(self.mechanism, self.solver.shapes, self.unit) == 0.0).tolist())
 
     def design_rows(self, values: Mapping[str, Array], count: int) -> DesignRows:
-        """The numbers of so many designs with these values (designs,) by name."""
+        """The numbers of `count` designs with these values (designs,) by name."""
         names = tuple(values)
         formula = self._formulas.get(names)
         if formula is None:

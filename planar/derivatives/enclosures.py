@@ -198,8 +198,8 @@ class ParametricSystem:
         inverse: Array = np.zeros((len(x), self.count, self.count))
         by_columns: Array = np.zeros((len(x), self.count, len(self.columns)))
         for _ in range(steps):
-            told = self._step.evaluate_batch(len(x), x, t)
-            jacobian, by_columns, residual = (part.transpose(0, 2, 1) for part in told)
+            parts = self._step.evaluate_batch(len(x), x, t)
+            jacobian, by_columns, residual = (part.transpose(0, 2, 1) for part in parts)
             inverse, is_singular = invert_matrices(jacobian)
             x = x - (inverse @ residual)[:, :, 0]
             x[is_singular] = np.nan

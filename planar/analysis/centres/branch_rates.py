@@ -29,7 +29,7 @@ def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str,
     first, second, both = (left_null.T @ each for each in bent)
     mixed = 0.5 * (both - first - second)
     forms = np.array([[first, mixed], [mixed, second]]).transpose(2, 0, 1)
-    directions = branch_directions(forms, SINGULAR_TOLERANCE).found
+    directions = branch_directions(forms, SINGULAR_TOLERANCE).vectors
     found = []
     for c in directions if len(directions) == 2 else ():
         moved = poles_of_motions(state, here, here.motions @ c[:, None], middle, size)

@@ -205,14 +205,14 @@ class OutputLink:
         places = {force_point(self.driving_pairs[name], self.link) for name in names}
         place = places.pop()
         if places or place is None:
-            told = f"{self.link} is driven at several places, or by wheels"
-            raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
+            reason = f"{self.link} is driven at several places, or by wheels"
+            raise BadInput(self.link, f"{reason}, so that no one line of force with one pin tells a transmission angle")
         link, point = place
         couple = np.abs(driving.moment_about(field.point_rates(link, field.shapes[link].position(point))))
         # beside the torque of one that it balances
         if np.max(couple[np.isfinite(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
-            told = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
-            raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
+            reason = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
+            raise BadInput(self.link, f"{reason}, so that no line of force through one pin tells a transmission angle")
 
 
 @lru_cache(maxsize=16)

@@ -274,7 +274,7 @@ class _PositionsWriter(KernelWriter):
         return t.and_flags(is_sure, t.or_flags(is_closed, is_open)), is_open, is_beyond
 
     def _load_before(self, row: int, back: int) -> str:
-        """A row at the positions before those of the lanes by so many."""
+        """A row at the positions that lie `back` before those of the lanes."""
         t = self.ir
         return t.load(t.double_pointer(self.entry_pointer("%out", row), str(-back)))
 

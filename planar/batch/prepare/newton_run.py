@@ -169,7 +169,7 @@ class _NewtonWriter:
         return load_number(self.ir, self.order, (kind, 0))
 
     def _take_scratch(self, count: int) -> str:
-        """Memory for so many vectors."""
+        """Memory for `count` vectors."""
         first, self.scratch_size = self.scratch_size, self.scratch_size + count * LANES
         return self.ir.double_pointer("%scratch", str(first))
 
@@ -434,7 +434,7 @@ def _assembly_lanes(reference: ReferenceDesign, equations: KernelEquations) -> t
 
 
 def _step_table(u: Array, steps: int) -> tuple[Array, Array]:
-    """The table of a piece of so many steps, and the corrections of each."""
+    """The table of a piece of `steps` steps, and the corrections of each."""
     table, counts = step_table(u[: steps + 1] - u[0])
     # what is predicted from so few steps is off by as many powers of a step; each correction doubles the digits
     digits = max(-log10(longest_step(u)), 0.3)

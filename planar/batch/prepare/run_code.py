@@ -104,7 +104,7 @@ def _eight_bytes(value: Any) -> int:
 
 
 def padded_width(count: int) -> int:
-    """How many numbers a row of so many positions has: whole vectors."""
+    """The length of a row of `count` positions, rounded up to full vectors."""
     return -(-count // LANES) * LANES
 
 
@@ -148,7 +148,7 @@ def begin_run(t: IRWriter, stages: RunStages, wanted: range, sum_count: int = 0)
     """Begin the function that calls all stages while each goes well, and counts how many `wanted` positions are %good.
 
     A run that ends before the first of them is not sure. What follows is written for runs that are sure alone. There is
-    room for so many `%sums`.
+    room for `sum_count` numbers in `%sums`.
     """
     t.write_line(f"define void @{RUN_FUNCTION}({RUN_ARGUMENTS}) {{")
     t.write_label("entry")

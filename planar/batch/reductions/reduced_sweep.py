@@ -183,8 +183,10 @@ def reduce_all(source: Swept_, reductions: Mapping[str, Reduction[Swept_]], dtyp
     for name, function in reductions.items():
         values = np.asarray(function(source))
         if values.dtype == object or values.shape[:1] != (len(source),):
-            told = f"a reduction gives an array with an entry for each of {len(source)} designs, not one {values.shape}"
-            raise BadInput(f"reduce.{name}", told)
+            reason = (
+                f"a reduction gives an array with an entry for each of {len(source)} designs, not one {values.shape}"
+            )
+            raise BadInput(f"reduce.{name}", reason)
         if dtype != "float64" and values.dtype.kind in "fc":
             values = values.astype("complex64" if values.dtype.kind == "c" else dtype)
         reduced[name] = values

@@ -237,7 +237,7 @@ def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifu
     if first is None or coming is None or not _leads_to(curve, point, coming):
         return None
     directions = branch_directions(conditions.forms)
-    others = [conditions.branch_along(c) for c in directions.found if not is_same_direction(c, first)]
+    others = [conditions.branch_along(c) for c in directions.vectors if not is_same_direction(c, first)]
     branches = tuple(branch for branch in others if branch is not None)
     return Bifurcation(y, (coming, *branches), directions.is_complete and len(branches) == len(others), len(first) - 1)
 
@@ -252,7 +252,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     if conditions is None:
         return None
     directions = branch_directions(conditions.forms)
-    branches = [branch for branch in map(conditions.branch_along, directions.found) if branch is not None]
+    branches = [branch for branch in map(conditions.branch_along, directions.vectors) if branch is not None]
     outgoing = [
         branch if branch.input_rate > 0.0 else branch.reversed()
         for branch in branches
@@ -264,7 +264,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     sense = np.sign(curve.input_direction[np.argmax(np.abs(curve.input_direction))])
     rates = [tuple(np.round(sense * branch.tangent[:-1] / branch.input_rate, 6)) for branch in outgoing]
     order = sorted(range(len(outgoing)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
-    is_complete = directions.is_complete and len(branches) == len(directions.found)
+    is_complete = directions.is_complete and len(branches) == len(directions.vectors)
     return Bifurcation(conditions.y, tuple(outgoing[k] for k in order), is_complete, conditions.null.shape[1] - 1)
 
 
@@ -301,7 +301,7 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     conditions = _conditions_at_start(SolutionCurve(setup, setup.inputs.u, axis), np.append(z, 0.0))
     if conditions is None or conditions.null.shape[1] != 2:
         return None
-    directions = branch_directions(conditions.forms).found
+    directions = branch_directions(conditions.forms).vectors
     directions = [c for c in directions if abs(float(conditions.null[-1] @ c)) > ZERO_INPUT_RATE]
     # in units of time in which the inputs run at speed one
     acceleration = u2 / speed**2 if speed > 0.0 else 0.0 * u2
@@ -376,7 +376,7 @@ def nearest_direction(forms: Array, c: Array, tolerance: float = EXACT_FORM_TOLE
 class BranchDirections(NamedTuple):
     """Directions (k,) of length one, each with one of its two senses, and whether these are surely all."""
 
-    found: list[Array]
+    vectors: list[Array]
     is_complete: bool
 
 
