@@ -34,6 +34,7 @@ from planar.batch.prepare.run_code import (
     write_shifted_inputs,
 )
 from planar.codegen.llvm_ir import IRWriter
+from planar.codegen.tape import LinkDirection, write_turn_flags
 from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
@@ -240,7 +241,8 @@ class _PositionsWriter(KernelWriter):
         is_first, is_early = (self._negate(t.lanes_from(self.lane, f"splat (i64 {k})")) for k in (1, 2))
         is_open = is_beyond = "zeroinitializer"
         is_sure = "splat (i1 true)"
-        row = angle_rows.stop + 2 * len(self.equations.carrying_angles)
+        turn_rows = range(angle_rows.stop, angle_rows.stop + 2 * len(self.equations.carrying_angles))
+        row = turn_rows.stop
         for form in (*self.equations.closed_forms, *(None for _ in self.equations.stop_pairs)):
             earlier, before, current = (self._load_before(row, back) for back in (2, 1, 0))
             row += 1
@@ -265,10 +267,12 @@ class _PositionsWriter(KernelWriter):
             turn = t.binary("sub", self._load_before(angle_row, 0), self._load_before(angle_row, 1))
             is_near = t.compare("ule", t.call_intrinsic("fabs", turn), t.constant(MAX_TURN_PER_STEP))
             is_sure = t.and_flags(is_sure, t.or_flags(is_near, is_first))
-        for turn_row in range(angle_rows.stop, angle_rows.stop + 2 * len(self.equations.carrying_angles), 2):
-            parts = [[self._load_before(turn_row + part, back) for back in (0, 1)] for part in (0, 1)]
-            along = t.add_all([t.binary("mul", *part) for part in parts])
-            is_near = t.compare("uge", along, t.constant(LEAST_COSINE))
+        if turn_rows:
+            directions = [
+                LinkDirection(self._load_before(k, 0), self._load_before(k + 1, 0), None) for k in turn_rows[::2]
+            ]
+            directions_before = [self._load_before(k, 1) for k in turn_rows]
+            is_near = write_turn_flags(t, "splat (i1 true)", directions, directions_before, LEAST_COSINE)
             is_sure = t.and_flags(is_sure, t.or_flags(is_near, is_first))
         is_closed = t.compare("ole", self._load_before(row, 0), tolerance)
         return t.and_flags(is_sure, t.or_flags(is_closed, is_open)), is_open, is_beyond
