@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import nan
 from typing import Any, NamedTuple
 
@@ -23,8 +23,6 @@ LANES = 8
 """Steps in one vector; the length of a row is a multiple of it."""
 GOOD, DEAD_POINT, UNDECIDED = range(3)
 """Outcomes of a sequence: good to the end, until a dead point, until a step that is not sure."""
-SHIFT = LANES.bit_length() - 1
-"""By how many bits a number of steps is one of vectors."""
 LONG_CALL_NUMBERS = 2**14
 """Blocks times steps from which on other threads run while they are computed."""
 MAX_BLOCK_FUNCTIONS = 4096
@@ -192,113 +190,174 @@ def run_tape(functions: Sequence[Any], steps: int, tape: Tape) -> TapeResult:
 @lru_cache(maxsize=MAX_BLOCK_FUNCTIONS)
 def compile_block(formula: TapeFormula, least_cosine: float = -1.0) -> Any:
     """The function of a kind by its formula. `least_cosine`: of the angle by which a link may turn in a step."""
-    return compile_function(_BlockWriter(formula, least_cosine).write(), BLOCK_NAME, *BLOCK_ARGUMENT_TYPES)
+    t, wanted = IRWriter(LANES), formula.formula
+    block = BlockText(t)
+    block.begin_steps(len(formula.directions) if formula.is_checked else None)
+    names = {
+        number: block.number(leaf.place) if leaf.source == "p" else block.load_row(leaf.place, leaf.part)
+        for number, leaf in wanted.inputs.items()
+    }
+    known: dict[int, str] = {}
+    t.write_values(wanted.instructions, wanted.order, known, names)
+    values = [known[number] for number in wanted.outputs]
+    block.store_rows(values, formula.output_rows)
+    if formula.is_checked:
+        directions = [
+            LinkDirection(values[x], values[y], k if k is None else values[k]) for x, y, k in formula.directions
+        ]
+        is_closed = t.compare("ole", values[-2], block.tolerance)
+        block.end_checked_steps(is_closed, directions, values[-1], least_cosine)
+    else:
+        block.end_steps()
+    return block.function
 
 
-class _BlockWriter:
-    """Writes the function of `compile_block`."""
+class BlockText:
+    """The function of a kind of block, written front to back: a loop over its steps, as many at once as there are
+    lanes."""
 
-    def __init__(self, formula: TapeFormula, least_cosine: float):
-        self.ir, self.formula, self.least_cosine = IRWriter(LANES), formula, least_cosine
-
-    def write(self) -> str:
-        """The text of the function."""
-        t, tape_formula = self.ir, self.formula
+    def __init__(self, ir: IRWriter):
+        t = self.ir = ir
         t.write_line(f"define void @{BLOCK_NAME}({BLOCK_ARGUMENTS}) {{")
         t.write_label("entry")
-        t.write_line(f"%rounded = add i64 %limit, {LANES - 1}")
-        t.write_line(f"%vectors = lshr i64 %rounded, {SHIFT}")
+        t.write_line(f"%rounded = add i64 %limit, {t.lanes - 1}")
+        t.write_line(f"%vectors = lshr i64 %rounded, {t.lanes.bit_length() - 1}")
         self.tolerance, self.clearance = t.broadcast("%tolerance"), t.broadcast("%clearance")
-        slots: dict[int, str] = {}
+        t.mark_hoist_point()
+        self._slots: dict[int, str] = {}
+        self._rows: dict[tuple[int, int], str] = {}
+        self._numbers: dict[int, str] = {}
+        self._watched: list[list[str]] = []
 
-        def row_pointer(slot: int, row: int) -> str:
-            if slot not in slots:
-                pointer = t.add_instruction(f"getelementptr ptr, ptr %rows, i64 {slot}")
-                slots[slot] = t.add_instruction(f"load ptr, ptr {pointer}")
-            return t.double_pointer(slots[slot], t.add_instruction(f"mul i64 %stride, {row}"))
+    def slot(self, slot: int) -> str:
+        """The address of a slot."""
+        if slot not in self._slots:
+            with self.ir.hoisted():
+                pointer = self.ir.add_instruction(f"getelementptr ptr, ptr %rows, i64 {slot}")
+                self._slots[slot] = self.ir.add_instruction(f"load ptr, ptr {pointer}")
+        return self._slots[slot]
 
-        names: dict[int, str] = {}
-        input_pointers: dict[int, str] = {}
-        for number, leaf in tape_formula.formula.inputs.items():
-            if leaf.source == "p":
-                place = t.double_pointer("%p", str(leaf.place))
-                names[number] = t.broadcast(t.add_instruction(f"load double, ptr {place}"))
-            else:
-                input_pointers[number] = row_pointer(leaf.place, leaf.part)
-        output_pointers = [row_pointer(*place) for place in tape_formula.output_rows]
+    def number(self, place: int) -> str:
+        """A number of the block, in every lane."""
+        t = self.ir
+        if place not in self._numbers:
+            with t.hoisted():
+                pointer = t.double_pointer("%p", str(place))
+                self._numbers[place] = t.broadcast(t.add_instruction(f"load double, ptr {pointer}"))
+        return self._numbers[place]
+
+    def _row_pointer(self, slot: int, row: int) -> str:
+        base = self.slot(slot)
+        if (slot, row) not in self._rows:
+            with self.ir.hoisted():
+                first = self.ir.add_instruction(f"mul i64 %stride, {row}")
+                self._rows[slot, row] = self.ir.double_pointer(base, first)
+        return self.ir.double_pointer(self._rows[slot, row], "%off")
+
+    def load_row(self, slot: int, row: int) -> str:
+        """A row of a slot at the steps of the lanes."""
+        return self.ir.load(self._row_pointer(slot, row))
+
+    def store_rows(self, values: Sequence[str], rows: Sequence[tuple[int, int]]) -> None:
+        """Store values in rows, each a slot and the number of its row; further values are not stored."""
+        for value, row in zip(values, rows, strict=False):
+            self.ir.store(value, self._row_pointer(*row))
+
+    def begin_steps(self, direction_count: int | None = None) -> None:
+        """Begin the loop. `direction_count`: of links that must not turn fast; None where steps are not checked."""
+        t = self.ir
         t.write_line("br label %step")
         t.write_label("step")
-        t.write_line("%vector = phi i64 [0, %entry], [%vectornext, %next]")
-        watched = [
-            f"%watched{k}" for k in range(2 * len(tape_formula.directions) + 1 if tape_formula.is_checked else 0)
-        ]
-        for name in watched:
+        t.write_line("%k = phi i64 [0, %entry], [%knext, %next]")
+        if direction_count is not None:
+            # of each value that is watched the vectors before; the last one, the distance measure, is wanted two back
+            depths = [1] * 2 * direction_count + [2 if t.lanes < 2 else 1]
+            self._watched = [[f"%watched{n}of{d}" for d in range(depth)] for n, depth in enumerate(depths)]
+        for name in (name for vectors in self._watched for name in vectors):
             t.write_line(f"{name} = phi {t.vector} [{t.constant(nan)}, %entry], [{name}next, %next]")
-        t.write_line(f"%off = mul i64 %vector, {LANES}")
-        for number, pointer in input_pointers.items():
-            names[number] = t.load(t.double_pointer(pointer, "%off"))
-        known: dict[int, str] = {}
-        t.write_values(tape_formula.formula.instructions, tape_formula.formula.order, known, names)
-        values = [known[number] for number in tape_formula.formula.outputs]
-        for value, pointer in zip(values, output_pointers, strict=False):
-            t.store(value, t.double_pointer(pointer, "%off"))
-        if tape_formula.is_checked:
-            self._write_check(watched, values)
-        else:
-            t.write_line("br label %next")
-        t.write_label("next")
-        t.close_loop("vector", "vectors", "step", "judged" if tape_formula.is_checked else "done")
-        if tape_formula.is_checked:
-            t.write_label("judged")
-            t.write_line(f"%lastlane = and i64 {t.add_instruction('sub i64 %limit, 1')}, {LANES - 1}")
-            stays = write_stays_clear(t, values[-1], self._earlier(values[-1], watched[-1], 1), self.clearance)
-            write_stays(t, t.add_instruction(f"extractelement <{LANES} x i1> {stays}, i64 %lastlane"))
-            t.write_line("br label %done")
-        t.write_label("done")
-        t.write_line("ret void")
-        t.write_line("}")
-        if tape_formula.is_checked:
-            t.write_line(f"declare i{LANES} @llvm.cttz.i{LANES}(i{LANES}, i1)")
-        return t.module_text()
+        t.write_line(f"%off = mul i64 %k, {t.lanes}")
 
-    def _write_check(self, watched: list[str], values: list[str]) -> None:
-        """Check a vector of steps: the turns of directions, the residual, and the distance measure from a dead point;
-        `watched` are the values of the vector before. The block ends at the first step that is not good."""
-        t, byte = self.ir, f"i{LANES}"
-        residual, clear = values[-2:]
-        directions = [
-            LinkDirection(values[x], values[y], k if k is None else values[k]) for x, y, k in self.formula.directions
-        ]
+    def end_steps(self) -> None:
+        """End the loop of steps that are not checked."""
+        self.ir.write_line("br label %next")
+        self.ir.write_label("next")
+        self.ir.close_loop("k", "vectors", "step", "done")
+        self._end()
+
+    def end_checked_steps(
+        self, is_good: str, directions: Sequence[LinkDirection], clear: str, least_cosine: float
+    ) -> None:
+        """Check a vector of steps that `is_good` so far: the turns of directions, and the distance measure `clear` from
+        a dead point. The block ends at the first step that is not good."""
+        t, byte, lanes = self.ir, f"i{self.ir.lanes}", f"<{self.ir.lanes} x i1>"
         parts = [*(part for direction in directions for part in direction[:2]), clear]
-        earlier = [self._earlier(value, before, 1) for value, before in zip(parts, watched, strict=True)]
-        good = write_turn_flags(
-            t, t.compare("ole", residual, self.tolerance), directions, earlier[:-1], self.least_cosine
-        )
-        judged = write_clear_flags(t, clear, earlier[-1], self._earlier(clear, watched[-1], 2), self.clearance)
-        for value, before in zip(parts, watched, strict=True):
-            # a value of its own name, for the next vector
-            t.write_line(f"{before}next = select i1 true, {t.vector} {value}, {t.vector} {value}")
-        t.write_line(f"%fine = bitcast <{LANES} x i1> {t.and_flags(good, judged.is_clear)} to {byte}")
+        earlier = [self._earlier(value, vectors, 1) for value, vectors in zip(parts, self._watched, strict=True)]
+        one, two = earlier[-1], self._earlier(clear, self._watched[-1], 2)
+        is_good = write_turn_flags(t, is_good, directions, earlier[:-1], least_cosine)
+        # between steps the measure deviates by less than its second difference; NaN before the first steps passes
+        bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
+        needed = self._pick("ogt", bend, self.clearance)
+        least_before = self._pick("olt", two, one)
+        is_clear = t.compare("ogt", self._pick("olt", least_before, clear), needed)
+        for value, vectors in zip(parts, self._watched, strict=True):
+            for name, current in zip(vectors, (value, *vectors), strict=False):
+                # a value of its own name, for the next vector
+                t.write_line(f"{name}next = select i1 true, {t.vector} {current}, {t.vector} {current}")
+        t.write_line(f"%fine = bitcast {lanes} {t.and_flags(is_good, is_clear)} to {byte}")
         t.write_line(f"%allfine = icmp eq {byte} %fine, -1")
         t.write_line("br i1 %allfine, label %next, label %ending")
         t.write_label("ending")
         bad = t.add_instruction(f"xor {byte} %fine, -1")
         lane = t.add_instruction(f"call {byte} @llvm.cttz.{byte}({byte} {bad}, i1 true)")
-        t.write_line(f"%come = add i64 %off, {t.add_instruction(f'zext {byte} {lane} to i64')}")
+        t.write_line(f"%lane = zext {byte} {lane} to i64")
+        t.write_line("%come = add i64 %off, %lane")
         t.write_line("%ends = icmp slt i64 %come, %limit")
         t.write_line("br i1 %ends, label %stopped, label %judged")
         t.write_label("stopped")
         below = t.compare("olt", clear, t.constant(0.0))
-        dead = t.and_flags(below, t.compare("ogt", judged.least_before, judged.needed))
-        bits = t.add_instruction(f"bitcast <{LANES} x i1> {dead} to {byte}")
-        is_dead = t.add_instruction(f"trunc {byte} {t.add_instruction(f'lshr {byte} {bits}, {lane}')} to i1")
-        write_ended(t, "%come", t.add_instruction(f"select i1 {is_dead}, i64 {DEAD_POINT}, i64 {UNDECIDED}"))
+        dead = t.and_flags(below, t.compare("ogt", least_before, needed))
+        is_dead = t.add_instruction(f"extractelement {lanes} {dead}, i64 %lane")
+        t.write_line("store i64 %come, ptr %ended")
+        outcome = t.add_instruction(f"select i1 {is_dead}, i64 {DEAD_POINT}, i64 {UNDECIDED}")
+        t.write_line(f"store i64 {outcome}, ptr {t.add_instruction('getelementptr i64, ptr %ended, i64 1')}")
         t.write_line("br label %done")
+        t.write_label("next")
+        t.close_loop("k", "vectors", "step", "judged")
+        t.write_label("judged")
+        t.write_line(f"%lastlane = and i64 {t.add_instruction('sub i64 %limit, 1')}, {t.lanes - 1}")
+        # towards a dead point of another block the measure changes as the root of the distance to it
+        change = t.call_intrinsic("fabs", t.binary("sub", clear, one))
+        ahead = t.binary("sub", clear, t.binary("mul", t.constant(GREATEST_CHANGE), change))
+        stays = t.compare("ogt", ahead, self.clearance)
+        flag = t.add_instruction(f"extractelement {lanes} {stays}, i64 %lastlane")
+        place = t.add_instruction("getelementptr i64, ptr %ended, i64 2")
+        t.write_line(f"store i64 {t.add_instruction(f'zext i1 {flag} to i64')}, ptr {place}")
+        t.write_line("br label %done")
+        self._end()
+        t.write_line(f"declare {byte} @llvm.cttz.{byte}({byte}, i1)")
 
-    def _earlier(self, value: str, before: str, by: int) -> str:
-        """The values of a vector shifted by some steps; `before` is the previous vector."""
-        v, lanes = self.ir.vector, ", ".join(f"i32 {LANES + k - by}" for k in range(LANES))
-        return self.ir.add_instruction(f"shufflevector {v} {before}, {v} {value}, <{LANES} x i32> <{lanes}>")
+    def _end(self) -> None:
+        self.ir.write_label("done")
+        self.ir.write_line("ret void")
+        self.ir.write_line("}")
+
+    def _pick(self, predicate: str, a: str, b: str) -> str:
+        return self.ir.select(self.ir.compare(predicate, a, b), a, b)
+
+    def _earlier(self, value: str, vectors: Sequence[str], by: int) -> str:
+        """The values of a vector shifted by some steps; `vectors` are those before it."""
+        t = self.ir
+        if by > t.lanes:
+            return vectors[1]
+        lanes = ", ".join(f"i32 {t.lanes + k - by}" for k in range(t.lanes))
+        return t.add_instruction(
+            f"shufflevector {t.vector} {vectors[0]}, {t.vector} {value}, <{t.lanes} x i32> <{lanes}>"
+        )
+
+    @cached_property
+    def function(self) -> Any:
+        """The complete function, compiled."""
+        return compile_function(self.ir.module_text(), BLOCK_NAME, *BLOCK_ARGUMENT_TYPES)
 
 
 class LinkDirection(NamedTuple):
@@ -321,55 +380,3 @@ def write_turn_flags(
         # NaN before the first step passes
         is_good = t.and_flags(is_good, t.compare("uge", along, minimum))
     return is_good
-
-
-def write_turn_check(
-    t: IRWriter, is_good: str, directions: Sequence[LinkDirection], slots: Sequence[str], least_cosine: float
-) -> str:
-    """The same, with x and y of each direction in slots: those of the step before, then those of this step."""
-    is_good = write_turn_flags(t, is_good, directions, [t.load(slot) for slot in slots], least_cosine)
-    for value, slot in zip((part for direction in directions for part in direction[:2]), slots, strict=True):
-        t.store(value, slot)
-    return is_good
-
-
-class ClearFlags(NamedTuple):
-    """Whether no dead point is near a step; the least distance measure of the two steps before it, and the least that
-    they need."""
-
-    is_clear: str
-    least_before: str
-    needed: str
-
-
-def write_clear_flags(t: IRWriter, clear: str, one: str, two: str, clearance: str) -> ClearFlags:
-    """Judge a step by its distance measure from a dead point and those of the two steps before: between steps it
-    deviates by less than its second difference."""
-
-    def pick(predicate: str, a: str, b: str) -> str:
-        return t.select(t.compare(predicate, a, b), a, b)
-
-    bend = t.call_intrinsic("fabs", t.binary("sub", t.binary("sub", clear, one), t.binary("sub", one, two)))
-    # NaN before the first steps passes
-    needed, minimum = pick("ogt", bend, clearance), pick("olt", two, one)
-    return ClearFlags(t.compare("ogt", pick("olt", minimum, clear), needed), minimum, needed)
-
-
-def write_stays_clear(t: IRWriter, clear: str, one: str, clearance: str) -> str:
-    """Whether no dead point is near before the next step, by the distance measures of a step and the one before:
-    towards a dead point of another block the measure changes as the root of the distance to it."""
-    change = t.call_intrinsic("fabs", t.binary("sub", clear, one))
-    ahead = t.binary("sub", clear, t.binary("mul", t.constant(GREATEST_CHANGE), change))
-    return t.compare("ogt", ahead, clearance)
-
-
-def write_stays(t: IRWriter, flag: str) -> None:
-    """Store whether a block stays clear."""
-    place = t.add_instruction("getelementptr i64, ptr %ended, i64 2")
-    t.write_line(f"store i64 {t.add_instruction(f'zext i1 {flag} to i64')}, ptr {place}")
-
-
-def write_ended(t: IRWriter, step: str, outcome: str) -> None:
-    """Store the first step that is not good, and the outcome there."""
-    t.write_line(f"store i64 {step}, ptr %ended")
-    t.write_line(f"store i64 {outcome}, ptr {t.add_instruction('getelementptr i64, ptr %ended, i64 1')}")

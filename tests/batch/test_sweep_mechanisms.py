@@ -9,7 +9,7 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.batch.march.prediction import LEAST_COSINE
-from planar.batch.mechanisms import partition
+from planar.batch.mechanisms import block_type, partition
 from planar.batch.mechanisms.block_type import BlockPair, BlockSignature, find_block_type
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
 from planar.codegen import instructions, tape
@@ -325,7 +325,7 @@ def test_what_the_general_path_does_is_counted_and_said():
 
 def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypatch):
     mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
-    longest = 500
+    longest = 1_000
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", longest)
     monkeypatch.setattr(partition, "_structures", {})
     find_block_type.cache_clear()
@@ -470,11 +470,25 @@ def plain_ending(left, clear, directions, tolerance, clearance):
     return steps, tape.GOOD
 
 
-def test_a_tape_ends_where_its_steps_one_after_the_other_end():
+class UncheckedText(tape.BlockText):
+    """Writes in place of its checks whether a step is closed, and its distance measure from a dead point."""
+
+    def begin_steps(self, direction_count=None):
+        super().begin_steps()
+
+    def end_checked_steps(self, is_good, directions, clear, least_cosine):
+        is_open = self.ir.select(is_good, self.ir.constant(0.0), self.ir.constant(1.0))
+        self.store_rows([is_open, clear], [(2, 8), (2, 9)])
+        self.end_steps()
+
+
+def test_a_tape_ends_where_its_steps_one_after_the_other_end(monkeypatch):
     """Dyads beside a link that turns: some reach round, some come to a dead point, some to where they turn fast."""
     pins = ((0, -1), (1, -2), (0, 1))
     joints = tuple(BlockPair(pair_types()["turning"], of, False) for of in pins)
-    formula = find_block_type(BlockSignature(2, 2, joints)).run_formula(False)
+    checked = block_type.BlockType(BlockSignature(2, 2, joints)).run_function(False)
+    monkeypatch.setattr(block_type, "BlockText", UncheckedText)
+    unchecked = block_type.BlockType(BlockSignature(2, 2, joints)).run_function(False)
     steps, many = 601, 60
     tolerance, clearance = np.full(many, 1e-12), np.full(many, 1e-4)
     rng = np.random.default_rng(3)
@@ -487,19 +501,16 @@ def test_a_tape_ends_where_its_steps_one_after_the_other_end():
     p[:, :-1] += 1e-3 * rng.uniform(size=(many, 12))
     p[:, 10] = np.append(rng.uniform(0.2, 1.6, many - 1), 0.02)
     at = room.ctypes.data + np.arange(2 + many) * room.strides[0]
-    slots = np.column_stack([np.full((many, 2), at[[1, 0]]), at[2:]])
-    directions = (2, 3, None), (6, 7, None)
-    rows = tuple((2, row) for row in range(len(formula.outputs)))
+    # the second link is four rows behind the first
+    slots = np.column_stack([np.full((many, 2), at[[1, 0]]), at[2:], at[2:] + 4 * room.strides[1]])
     whole = tape.Tape(np.arange(many + 1), np.zeros(many, dtype=int), slots, p, tolerance, clearance)
-    tape.run_tape([tape.compile_block(tape.TapeFormula(formula, rows))], steps, whole)
+    tape.run_tape([unchecked], steps, whole)
     values = room[2:, :, :steps].copy()
-    checked = tape.TapeFormula(formula, rows[:8], directions, is_checked=True)
-    found = tape.run_tape([tape.compile_block(checked, LEAST_COSINE)], steps, whole)
+    found = tape.run_tape([checked], steps, whole)
     for k, own in enumerate(values):
         good = found.good[k]
         np.testing.assert_array_equal(room[2 + k, :8, :good], own[:8, :good])
-        turns = [own[list(each[:2])] for each in directions]
-        wanted = plain_ending(own[8], own[9], turns, tolerance[k], clearance[k])
+        wanted = plain_ending(own[8], own[9], [own[2:4], own[6:8]], 0.5, clearance[k])
         assert (found.good[k], found.outcome[k]) == wanted, k
     assert set(found.outcome.tolist()) == {tape.GOOD, tape.DEAD_POINT, tape.UNDECIDED}
 

@@ -6,7 +6,6 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 from itertools import chain
 from math import inf, nan
 from typing import NamedTuple
@@ -23,8 +22,6 @@ from planar.batch.march.kernel_writer import (
     write_angle_sum,
     write_closes,
     write_keeps_apart,
-    write_normalised,
-    write_small_rotation,
     write_turns_little,
 )
 from planar.batch.march.prediction import (
@@ -34,10 +31,9 @@ from planar.batch.march.prediction import (
     PREDICTOR_ORDER,
     least_regularity,
 )
-from planar.codegen.llvm_linear import LinearSystems
-from planar.codegen.tape import LinkDirection, write_turn_check
+from planar.codegen.tape import LinkDirection, write_turn_flags
 from planar.equations.closed_form import ClosedForm
-from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
 
@@ -45,8 +41,6 @@ MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "ta
 MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
 from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
-HISTORY_LENGTH = 8
-"""Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 INVARIANT_KINDS = frozenset({"p", "q", "u1", "u2", "scale", "stop", "number"})
 """Of operands that are the same at all steps of a design."""
 
@@ -133,22 +127,14 @@ class _DesignsKernelWriter(KernelWriter):
         sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
         t.write_line(f"define void @{MARCH_FUNCTION}({sizes}, {arrays}, {numbers}, {written}) {{")
         t.write_label("entry")
-        self.state_slots = {leaf: t.allocate() for leaf in self.state}
-        self.history_slots = {
-            leaf: t.allocate(HISTORY_LENGTH) for leaf in self.state if leaf[1] in self.newton_unknowns
-        }
-        self.correction_slot = t.allocate()
-        self.block_correction_slots = {
-            part.block.block_index: t.allocate() for part in self.equations.blocks if part.closed_form is None
-        }
+        self.allocate_newton_state(self.state)
         watched = (*self.equations.closed_forms, *self.equations.stop_pairs)
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in watched]
         self.turn_slots = {k: (t.allocate(), t.allocate()) for k in self.equations.carrying_angles}
         self.regularity_slot, self.good_count_slot, self.candidate_count_slot = (t.allocate() for _ in range(3))
         self.passed_slot, self.candidate_slot = (t.allocate_flags() for _ in range(2))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
-        large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
-        self.linear_systems = LinearSystems(t, max(large)) if large else None
+        self.allocate_linear_systems()
         scale = t.broadcast("%scale")
         t.write_line("br label %block")
         have, at_start = self._write_lanes_start()
@@ -202,12 +188,7 @@ class _DesignsKernelWriter(KernelWriter):
             sides = self.write_values([self.equations.sides], have | at_start | state)
             for k, side in enumerate(sides):
                 have["sign", k] = t.call_intrinsic("copysign", t.constant(1.0), side)
-        for leaf, value in state.items():
-            t.store(value, self.state_slots[leaf])
-        for leaf, ring in self.history_slots.items():
-            for k in range(HISTORY_LENGTH - 1):
-                t.store("zeroinitializer", t.element_pointer(ring, str(k)))
-            t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
+        self.store_start(state)
         t.store_flags("splat (i1 true)", self.passed_slot)
         t.store_flags("splat (i1 true)", self.candidate_slot)
         for slot in (self.good_count_slot, self.candidate_count_slot, *chain.from_iterable(self.bend_slots)):
@@ -241,11 +222,7 @@ class _DesignsKernelWriter(KernelWriter):
             if turns:
                 have["uc", k], have["us", k] = write_angle_sum(t, at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.regularity_slot)
-        t.store("zeroinitializer", self.correction_slot)
-        self.history_indices = [
-            t.add_instruction(f"and i64 {t.add_instruction(f'sub i64 %k, {j + 1}')}, {HISTORY_LENGTH - 1}")
-            for j in range(PREDICTOR_ORDER)
-        ]
+        self.begin_newton_step()
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
         """A block in closed form; flags that say where its two assemblies keep apart."""
@@ -284,7 +261,11 @@ class _DesignsKernelWriter(KernelWriter):
             return []
         directions = [LinkDirection(have["zc", k], have["zs", k], None) for k in self.turn_slots]
         slots = [slot for both in self.turn_slots.values() for slot in both]
-        return [write_turn_check(self.ir, "splat (i1 true)", directions, slots, LEAST_COSINE)]
+        earlier = [self.ir.load(slot) for slot in slots]
+        is_good = write_turn_flags(self.ir, "splat (i1 true)", directions, earlier, LEAST_COSINE)
+        for value, slot in zip((part for direction in directions for part in direction[:2]), slots, strict=True):
+            self.ir.store(value, slot)
+        return [is_good]
 
     def _write_stops(self, have: OperandNames) -> list[str]:
         """Flags that say which pairs keep off their stops."""
@@ -317,72 +298,11 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(have[leaf, k], self.state_slots[leaf, k])
 
     def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
-        """Newton's method for a block from where it would be if it went on as before, so often as the step says."""
-        t, level = self.ir, part.block.block_index
-        slots = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
-        ahead = {
-            leaf: t.add_all(
-                [
-                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], index)))
-                    for w, index in zip(self.predictor_weights, self.history_indices, strict=True)
-                ]
-            )
-            for leaf in slots
-        }
-        for k in part.unknowns:
-            if self.equations.is_angle[k]:
-                ahead["zc", k], ahead["zs", k] = write_normalised(t, ahead["zc", k], ahead["zs", k])
-        for leaf, slot in slots.items():
-            t.store(ahead[leaf], slot)
+        """Newton's method for a block, with as many corrections as the step has."""
+        t = self.ir
+        self.write_prediction(part)
         count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
-        regularity, correction = t.load(self.regularity_slot), t.load(self.correction_slot)
-        block_correction = self.block_correction_slots[level]
-        t.store("zeroinitializer", block_correction)
-        t.write_line(f"br label %from{level}")
-        t.write_label(f"from{level}")
-        t.write_line(f"br label %newton{level}")
-        t.write_label(f"newton{level}")
-        t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
-        unknowns = {leaf: t.load(slot) for leaf, slot in slots.items()}
-        *steps, volume, lengths, squared_arm = self._write_newton_step(part, have | unknowns)
-        magnitudes = []
-        for k, step in zip(part.unknowns, steps, strict=True):
-            magnitudes.append(t.call_intrinsic("fabs", step))
-            back = t.add_instruction(f"fneg {t.vector} {step}")
-            if ("z", k) in unknowns:
-                unknowns["z", k] = t.binary("add", unknowns["z", k], back)
-            if ("z", k) in self.carried:
-                angle = unknowns["z", k]
-                unknowns["zc", k], unknowns["zs", k] = t.call_per_lane("cos", angle), t.call_per_lane("sin", angle)
-            elif self.equations.is_angle[k]:
-                c, s = unknowns["zc", k], unknowns["zs", k]
-                unknowns["zc", k], unknowns["zs", k] = write_small_rotation(t, c, s, back)
-        for leaf, slot in slots.items():
-            t.store(unknowns[leaf], slot)
-        t.store(t.add_all([t.load(block_correction), *magnitudes]), block_correction)
-        t.close_loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
-        t.write_label(f"solved{level}")
-        have.update({leaf: t.load(slot) for leaf, slot in slots.items()})
-        block_regularity = self._write_regularity(volume, lengths, squared_arm, len(part.unknowns))
-        t.store(t.call_intrinsic("minnum", regularity, block_regularity), self.regularity_slot)
-        t.store(t.binary("add", correction, t.load(block_correction)), self.correction_slot)
-        position = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
-        for leaf in slots:
-            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], position))
-
-    def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
-        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
-        and the square of the shortest: where it vanishes, as with the arm of a slide on which a link turns, an unknown
-        is not determined, however far the others' columns are from each other."""
-        e, block = self.equations.equations, part.block
-        residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
-        squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
-        if not part.is_large:
-            return self.write_values([*solve_with_volume(jacobian, residual), squared_arm], names)
-        assert self.linear_systems is not None
-        residuals, columns, arms = self.write_separately([residual, ca.vec(jacobian), squared_arm], names)
-        volume = self.linear_systems.factorise(columns, len(residuals))
-        return [*self.linear_systems.solve(residuals), volume, self.ir.constant(1.0), *arms]
+        self.write_corrections(part, have, count)
 
     def _write_rates(self, have: OperandNames) -> None:
         """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers.
@@ -411,11 +331,11 @@ class _DesignsKernelWriter(KernelWriter):
                     for k, value in zip(part.unknowns, solution, strict=True)
                 }
 
-    def _write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
+    def write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.request.point_blocks is not None:
-            return t.binary("div", volume, lengths)
+            return super().write_regularity(volume, lengths, squared_arm, count)
         minimum = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
         room = t.binary("sub", volume, t.binary("mul", lengths, t.constant(minimum)))
         return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))

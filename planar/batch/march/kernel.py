@@ -26,8 +26,6 @@ from planar.equations.linear import solve_by_determinants
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, first_and_second_rates
 from planar.equations.residuals import (
-    Frames,
-    PairValues,
     closing_error,
     input_positions,
     residuals,
@@ -35,7 +33,7 @@ from planar.equations.residuals import (
     split_pair_numbers,
 )
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
-from planar.foundation.geometry import Vector
+from planar.foundation.geometry import Vector, frame_at
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
@@ -43,9 +41,9 @@ from planar.model.pairs import MeasureKind, Pair
 Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 
-"z" of an unknown, "zc" and "zs" the cos and sin of an angle; "u", "uc", "us" the same of what is given; "p" the numbers
-of pairs, "q" those of points, "stop" those of stops; "u1", "u2" rates of what is given; "sign" of a block in closed
-form.
+"z" of an unknown, "zc" and "zs" the cos and sin of an angle; "u", "uc", "us" the same of an input; "p" the numbers of
+pairs ("pc", "ps" the cos and sin of one that is an angle, if an operand stands for these), "q" those of points, "stop"
+those of stops; "u1", "u2" rates of inputs; "sign" of a block in closed form.
 """
 
 
@@ -81,8 +79,10 @@ class KernelEquations:
     """A mechanism's equations with the blocks' closed forms. Raises UnsupportedOperation where a block holds itself
     twice.
 
-    `zeros`: operands of kinds "p" and "q" that are nothing in all designs, as most coordinates of pins in their links.
-    `stop_pairs`: those whose stops are looked at.
+    `zeros`: operands of kinds "p" and "q" that are zero in all designs, as most coordinates of pins in their links.
+    `stop_pairs`: the pairs whose stops are checked. `given_links`: links whose places are the first inputs. `blocks`:
+    by default those of the equations. `turns_numbers`: whether the numbers that are angles have operands for their cos
+    and sin.
     """
 
     def __init__(
@@ -91,16 +91,23 @@ class KernelEquations:
         mechanism: Mechanism,
         zeros: frozenset[Operand] = frozenset(),
         stop_pairs: tuple[Pair, ...] = (),
+        given_links: tuple[str, ...] = (),
+        blocks: tuple[KernelBlock, ...] | None = None,
+        turns_numbers: bool = False,
     ):
         e = self.equations = equations
         if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
         self.mechanism, self.zeros, self.stop_pairs = mechanism, zeros, stop_pairs
-        self.blocks = tuple(
-            KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
-        )
+        if blocks is None:
+            blocks = tuple(
+                KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
+            )
+        self.blocks, self.given_links = blocks, given_links
         self.is_angle = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns)
         self.input_is_angle = tuple(kind is MeasureKind.ANGLE for kind in e.input_kinds)
+        kinds = [kind for pair in mechanism.pairs for kind in pair.number_kinds]
+        self.number_is_angle = tuple(turns_numbers and kind is MeasureKind.ANGLE for kind in kinds)
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
         self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.has_large_blocks = any(part.is_large for part in self.blocks)
@@ -108,9 +115,10 @@ class KernelEquations:
         self.frames, self.pair_coordinates = frames_from_coordinates(
             ca.vertsplit(e.w),
             coordinate_columns(e.coordinates),
-            [link.name for link in mechanism.links],
+            [link.name for link in mechanism.links if link.name not in given_links],
             {pair.name: pair for pair in mechanism.pairs},
         )
+        self.frames |= {link: frame_at(*ca.vertsplit(e.u)[3 * k : 3 * k + 3]) for k, link in enumerate(given_links)}
         "of all links, and of pairs by name, as expressions"
         self.input_operands: tuple[Operand, ...] = tuple(
             operand
@@ -145,7 +153,10 @@ class KernelEquations:
 
         Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
         """
-        return closing_errors(self.equations, self.mechanism, self.frames, self.pair_coordinates)
+        e = self.equations
+        numbers, inputs = split_pair_numbers(self.mechanism.pairs, e.p), scalars(e.u)[3 * len(self.given_links) :]
+        rows = residuals(self.mechanism, self.frames, numbers, self.pair_coordinates, inputs)
+        return ca.vertcat(ca.SX(0, 1), *(closing_error(value, row.kind) for row, value in rows))
 
     def stop_coalescences(self, numbers: ca.SX) -> ca.SX:
         """For each pair with stops what reaches one where it meets one of them; see `StopLimits`."""
@@ -156,15 +167,6 @@ class KernelEquations:
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """First and second rates of the unknowns, block after block."""
         return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
-
-
-def closing_errors(
-    e: ConstraintEquations, mechanism: Mechanism, frames: Frames, pair_coordinates: PairValues, first_input: int = 0
-) -> ca.SX:
-    """The residual of every constraint with links at `frames`, and its inputs in u from the first one on."""
-    numbers = split_pair_numbers(mechanism.pairs, e.p)
-    rows = residuals(mechanism, frames, numbers, pair_coordinates, scalars(e.u)[first_input:])
-    return ca.vertcat(ca.SX(0, 1), *(closing_error(value, row.kind) for row, value in rows))
 
 
 @lru_cache(maxsize=256)
@@ -216,9 +218,8 @@ class KernelInstructions:
             "stop": ca.SX.sym("stop", NUMBERS_PER_STOP * len(equations.stop_pairs)),
         }
         self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
-        self.sign_index = {
-            part.block.block_index: k for k, part in enumerate(p for p in equations.blocks if p.closed_form is not None)
-        }
+        with_signs = [part for part in equations.blocks if part.closed_form and part.closed_form.sign.numel()]
+        self.sign_index = {part.block.block_index: k for k, part in enumerate(with_signs)}
 
     def state_operands(self) -> tuple[Operand, ...]:
         """What stands for all unknowns: a length, or the cos and sin of an angle, and its value where it is carried."""
@@ -238,11 +239,12 @@ class KernelInstructions:
             check_length(written + function.n_instructions())
         listing: InstructionList[Operand] = InstructionList()
         angles: dict[int, CosSin] = {}
-        are_angles = {"z": self.equations.is_angle, "u": self.equations.input_is_angle}
+        equations = self.equations
+        are_angles = {"z": equations.is_angle, "u": equations.input_is_angle, "p": equations.number_is_angle}
         arguments = []
         for name, symbol in self.symbols.items():
             numbers = [
-                listing.add_constant(0.0) if (name, k) in self.equations.zeros else listing.add_input((name, k))
+                listing.add_constant(0.0) if (name, k) in equations.zeros else listing.add_input((name, k))
                 for k in range(symbol.numel())
             ]
             arguments.append(numbers)
@@ -262,16 +264,19 @@ class KernelInstructions:
         ]
 
     def closed_form_outputs(self, part: KernelBlock) -> list[ca.SX]:
-        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet.
+        """The unknowns of a block in closed form, then its `coalescence`."""
+        form = part.closed_form
+        assert form is not None
+        return [*(value for values in form.values for value in values), self.coalescence(form)]
+
+    def coalescence(self, form: ClosedForm) -> ca.SX:
+        """How near the two assemblies of a closed form are to where they meet.
 
         An arm that shrinks to `LEAST_START_REGULARITY` counts as that too: what turns on it is not determined.
         """
-        form = part.closed_form
-        assert form is not None
-        near = form.coalescence
-        if form.squared_arm is not None:
-            near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
-        return [*(value for values in form.values for value in values), near]
+        if form.squared_arm is None:
+            return form.coalescence
+        return form.coalescence + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
 
     @staticmethod
     def slow_nearness(part: KernelBlock) -> ca.SX:

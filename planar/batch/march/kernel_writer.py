@@ -9,21 +9,34 @@ from math import sqrt
 import casadi as ca
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
-from planar.batch.march.prediction import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, MAX_TURN_PER_STEP
+from planar.batch.march.prediction import (
+    LEAST_KERNEL_REGULARITY,
+    LEAST_START_REGULARITY,
+    MAX_TURN_PER_STEP,
+    PREDICTOR_ORDER,
+)
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
+from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.closed_form import ClosedForm
+from planar.equations.linear import solve_with_volume
+from planar.equations.rates import block_jacobian
 from planar.foundation.instruction_list import required_values
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
 OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""
+HISTORY_LENGTH = 8
+"""Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 LEAST_CANDIDATE_REGULARITY = 1e-3
 """Of a position that may stand as it is once it is known that there is no dead point before it."""
 
 
 class KernelWriter(KernelInstructions):
     """The text of one function, written front to back."""
+
+    regularity_slot: str
+    "of the least regular block that Newton's method solves, at a step"
 
     def __init__(
         self,
@@ -40,6 +53,8 @@ class KernelWriter(KernelInstructions):
         "the first design of the block of designs that is computed"
         self.hoisted_names: dict[int, str] = {}
         "of what does not vary"
+        self.predictor_weights: list[str] = []
+        self.linear_systems: LinearSystems | None = None
 
     def entry_pointer(self, base: str, row: int) -> str:
         """Where a row has the entries of the block of designs; rows are `%width` apart."""
@@ -79,6 +94,120 @@ class KernelWriter(KernelInstructions):
         *values, coalescence = self.write_values(self.closed_form_outputs(part), names)
         names.update(zip(self.closed_form_operands(part), values, strict=True))
         return coalescence
+
+    def allocate_newton_state(self, state: Sequence[Operand]) -> None:
+        """Allocate, where the function begins, the state and what Newton's blocks keep from step to step."""
+        t, parts = self.ir, [part for part in self.equations.blocks if part.closed_form is None]
+        unknowns = {k for part in parts for k in part.unknowns}
+        self.state_slots = {leaf: t.allocate() for leaf in state}
+        self.history_slots = {leaf: t.allocate(HISTORY_LENGTH) for leaf in state if leaf[1] in unknowns}
+        self.correction_slot = t.allocate()
+        self.block_correction_slots = {part.block.block_index: t.allocate() for part in parts}
+
+    def allocate_linear_systems(self) -> None:
+        """Allocate, where the function begins, what the systems of large blocks need."""
+        large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
+        self.linear_systems = LinearSystems(self.ir, max(large)) if large else None
+
+    def store_start(self, state: OperandNames) -> None:
+        """Store the state at the start, before which there is no history."""
+        t = self.ir
+        for leaf, value in state.items():
+            t.store(value, self.state_slots[leaf])
+        for leaf, ring in self.history_slots.items():
+            for k in range(HISTORY_LENGTH - 1):
+                t.store("zeroinitializer", t.element_pointer(ring, str(k)))
+            t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
+
+    def begin_newton_step(self) -> None:
+        """Begin step %k: nothing is corrected yet."""
+        t = self.ir
+        t.store("zeroinitializer", self.correction_slot)
+        self.history_indices = [
+            t.add_instruction(f"and i64 {t.add_instruction(f'sub i64 %k, {j + 1}')}, {HISTORY_LENGTH - 1}")
+            for j in range(PREDICTOR_ORDER)
+        ]
+
+    def write_prediction(self, part: KernelBlock) -> None:
+        """Predict the state of a block from the steps before, by `predictor_weights`."""
+        t, slots = self.ir, self._block_slots(part)
+        ahead = {
+            leaf: t.add_all(
+                [
+                    t.binary("mul", w, t.load(t.element_pointer(self.history_slots[leaf], index)))
+                    for w, index in zip(self.predictor_weights, self.history_indices, strict=True)
+                ]
+            )
+            for leaf in slots
+        }
+        for k in part.unknowns:
+            if self.equations.is_angle[k]:
+                ahead["zc", k], ahead["zs", k] = write_normalised(t, ahead["zc", k], ahead["zs", k])
+        for leaf, slot in slots.items():
+            t.store(ahead[leaf], slot)
+
+    def _block_slots(self, part: KernelBlock) -> OperandNames:
+        return {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
+
+    def write_corrections(self, part: KernelBlock, have: OperandNames, count: str) -> None:
+        """Correct a block from where it is predicted by `count` of Newton's steps."""
+        t, level, slots = self.ir, part.block.block_index, self._block_slots(part)
+        regularity, correction = t.load(self.regularity_slot), t.load(self.correction_slot)
+        block_correction = self.block_correction_slots[level]
+        t.store("zeroinitializer", block_correction)
+        t.write_line(f"br label %from{level}")
+        t.write_label(f"from{level}")
+        t.write_line(f"br label %newton{level}")
+        t.write_label(f"newton{level}")
+        t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
+        unknowns = {leaf: t.load(slot) for leaf, slot in slots.items()}
+        *steps, volume, lengths, squared_arm = self._write_newton_step(part, have | unknowns)
+        magnitudes = []
+        for k, step in zip(part.unknowns, steps, strict=True):
+            magnitudes.append(t.call_intrinsic("fabs", step))
+            back = t.add_instruction(f"fneg {t.vector} {step}")
+            if ("z", k) in unknowns:
+                unknowns["z", k] = t.binary("add", unknowns["z", k], back)
+            if ("z", k) in self.carried:
+                angle = unknowns["z", k]
+                unknowns["zc", k], unknowns["zs", k] = t.call_per_lane("cos", angle), t.call_per_lane("sin", angle)
+            elif self.equations.is_angle[k]:
+                c, s = unknowns["zc", k], unknowns["zs", k]
+                unknowns["zc", k], unknowns["zs", k] = self.write_rotation(c, s, back)
+        for leaf, slot in slots.items():
+            t.store(unknowns[leaf], slot)
+        t.store(t.add_all([t.load(block_correction), *magnitudes]), block_correction)
+        t.close_loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
+        t.write_label(f"solved{level}")
+        have.update({leaf: t.load(slot) for leaf, slot in slots.items()})
+        block_regularity = self.write_regularity(volume, lengths, squared_arm, len(part.unknowns))
+        t.store(t.call_intrinsic("minnum", regularity, block_regularity), self.regularity_slot)
+        t.store(t.binary("add", correction, t.load(block_correction)), self.correction_slot)
+        position = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
+        for leaf in slots:
+            t.store(have[leaf], t.element_pointer(self.history_slots[leaf], position))
+
+    def write_rotation(self, cos: str, sin: str, angle: str) -> tuple[str, str]:
+        """The cos and sin of an angle that Newton's method turns."""
+        return write_small_rotation(self.ir, cos, sin, angle)
+
+    def write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
+        """How regular the Jacobian of a block of `count` unknowns is."""
+        return self.ir.binary("div", volume, lengths)
+
+    def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
+        and the square of the shortest: where it vanishes, as with the arm of a slide on which a link turns, an unknown
+        is not determined, however far the others' columns are from each other."""
+        e, block = self.equations.equations, part.block
+        residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
+        squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
+        if not part.is_large:
+            return self.write_values([*solve_with_volume(jacobian, residual), squared_arm], names)
+        assert self.linear_systems is not None
+        residuals, columns, arms = self.write_separately([residual, ca.vec(jacobian), squared_arm], names)
+        volume = self.linear_systems.factorise(columns, len(residuals))
+        return [*self.linear_systems.solve(residuals), volume, self.ir.constant(1.0), *arms]
 
     def stop_number_names(self, load_row: Callable[[int], str]) -> OperandNames:
         """The numbers of stops, which stand behind p, by what loads a row of it."""
@@ -137,6 +266,16 @@ def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[st
         t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
         t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
     )
+
+
+def write_rational_rotation(t: IRWriter, c: str, s: str, angle: str) -> tuple[str, str]:
+    """The cos and sin of an angle turned by another one, however large: by the rational rotation, the same to third
+    order."""
+    half = t.binary("mul", t.constant(0.5), angle)
+    square = t.binary("mul", half, half)
+    scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
+    cos, sin = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale), t.binary("mul", angle, scale)
+    return write_angle_sum(t, c, s, cos, sin)
 
 
 def write_normalised(t: IRWriter, c: str, s: str) -> tuple[str, str]:

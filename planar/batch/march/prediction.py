@@ -28,15 +28,13 @@ CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
 
 
-def prediction_weights(steps: int, order: int, first: int) -> Array:
-    """Weights of the last values, the newest first, in the next at every step (steps, order): of the polynomial through
-    those that are known, at step `first` one, before it none, and at most `order`.
-
-    Of positions it is of one degree more than of the moves between as many of them.
-    """
-    weights = np.zeros((steps, order))
-    for count in range(1, order + 1):
-        weights[first + count - 1 :, :count] = [(-1.0) ** k * comb(count, k + 1) for k in range(count)]
+def prediction_weights(steps: int) -> Array:
+    """Weights of the positions before, the newest first, in that at every step (steps, PREDICTOR_ORDER): of the
+    polynomial through those that are known; of the start at the first step."""
+    weights = np.zeros((steps, PREDICTOR_ORDER))
+    for count in range(1, PREDICTOR_ORDER + 1):
+        weights[count:, :count] = [(-1.0) ** k * comb(count, k + 1) for k in range(count)]
+    weights[:1, 0] = 1.0
     return weights
 
 

@@ -314,8 +314,7 @@ def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
     steps, inputs = shape
     offsets = np.frombuffer(content).reshape(shape)
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
-    table[:, :PREDICTOR_ORDER] = prediction_weights(steps, PREDICTOR_ORDER, 1)
-    table[:1, 0] = 1.0  # ahead of the first step there is its start
+    table[:, :PREDICTOR_ORDER] = prediction_weights(steps)
     for k in range(inputs):
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1

@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from planar.batch.march.prediction import LEAST_COSINE
 from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.block_type import (
     COS,
@@ -24,11 +23,11 @@ from planar.batch.mechanisms.block_type import (
     BlockType,
     X,
     Y,
+    step_table,
     write_formula,
 )
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, find_linkage_assemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, PointArrays, SweepRequest, watched_links
-from planar.batch.mechanisms.newton_march import compile_newton_block, step_table
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
@@ -185,14 +184,7 @@ def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
             return compile_block(point_formula(rates))
         if number < FIRST_BLOCK_TYPE:
             return compile_block(input_formula(number == RUNNING_INPUT, rates))
-        kind = types[number - FIRST_BLOCK_TYPE]
-        if not kind.has_closed_form:
-            return compile_newton_block(kind, rates)
-        wide, inner = _pose_rows(rates), range(kind.slot_count - len(kind.inner_links), kind.slot_count)
-        rows = tuple((slot, row) for slot in inner for row in range(wide))
-        directions = tuple((wide * k + COS, wide * k + SIN, None) for k in range(len(inner)))
-        formula = TapeFormula(kind.run_formula(rates, polished), rows, directions, is_checked=True)
-        return compile_block(formula, LEAST_COSINE)
+        return types[number - FIRST_BLOCK_TYPE].run_function(rates, polished)
 
     has_newton_blocks = not all(kind.has_closed_form for kind in types)
     return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table if has_newton_blocks else None)

@@ -1,25 +1,26 @@
-"""Block types: links that are solved together from others whose poses are known, with all their formulas."""
+"""Block types: links that are solved together from others whose poses are known, and the functions that solve them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import product
-from typing import NamedTuple, TypeVar
+from math import inf
+from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
 
-from planar.batch.march.kernel import closing_errors
-from planar.codegen.instructions import CosSin, check_length, expand_angle_sums
-from planar.codegen.tape import BlockFormula, FormulaInput
+from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
+from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_normalised, write_rational_rotation
+from planar.batch.march.prediction import LEAST_COSINE, PREDICTOR_ORDER, correction_limit, prediction_weights
+from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.generic_evaluation import inline_function
-from planar.equations.linear import solve_by_determinants, solve_with_volume
-from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
+from planar.equations.linear import solve_by_determinants
+from planar.equations.rates import block_jacobian, first_and_second_rates
 from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
-from planar.foundation.geometry import GROUND, frame_at
+from planar.foundation.arrays import Array
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation
 from planar.model.link_shapes import Link
 from planar.model.mechanism import Input, Mechanism
@@ -79,118 +80,100 @@ MAX_SIGNS = 2
 """Maximum number of signs of a block type in closed form."""
 MAX_BLOCK_TYPES = 1024
 """Number of block types that are kept."""
+CORRECTIONS, FIRST_CORRECTIONS = 2, 10
+"""Steps of Newton's method where there are enough earlier steps for a prediction, and before."""
+TABLE_COLUMNS = PREDICTOR_ORDER + 2
+JUDGED_ROWS = 4
+"""Number of rows after the signs in the result of `BlockType.start_function`."""
 
 
 class BlockType:
-    """One type of block: its equations, in closed form where there is one, and the formulas that solve it.
+    """One type of block: its equations, in closed form where there is one, and the functions that solve it.
 
     Slots are the given links, the inputs, then the inner links. Numbers are p of the pairs, the cosine and sine of
     those that are angles, then a sign for each group of equations that has two assembly modes; at the start, in place
-    of the signs, the sums of the points in the sketch, see `_sketch_sums` of the initial assembly.
+    of the signs, the sums of the points in the sketch, see `_sketch_sums` of the initial assembly. Without closed form
+    the unknowns to start from stand in place of the signs, cosine and sine of an angle, a length and 0, and after the
+    slots there is one of the `step_table`.
     """
 
     def __init__(self, signature: BlockSignature):
-        self.signature = signature
         pairs = tuple(_SymbolicPair(f"p{k}", pair) for k, pair in enumerate(signature.pairs))
         self.given_links = tuple(_body_name(-1 - k) for k in range(signature.given_count))
-        inner = tuple(_body_name(k) for k in range(signature.inner_count))
-        self.inner_links = inner
+        self.inner_links = tuple(_body_name(k) for k in range(signature.inner_count))
         inputs = tuple(Input(p.name, 0.0) for p, joint in zip(pairs, signature.pairs, strict=True) if joint.driven)
-        names = ("frame", *inner, *self.given_links)
-        links = tuple(Link(name) for name in names)
-        self.mechanism = Mechanism("", "frame", links, pairs, inputs)  # type: ignore[arg-type]  # pairs as equations ask for them
-        self.equations: ConstraintEquations = build_equations(self.mechanism, self.given_links)
-        e = self.equations
+        links = tuple(Link(name) for name in ("frame", *self.inner_links, *self.given_links))
+        self.mechanism = Mechanism("", "frame", links, pairs, inputs)  # type: ignore[arg-type]  # pairs by formula
+        e = self.equations = build_equations(self.mechanism, self.given_links)
         self.input_count = len(inputs)
-        self.slot_count = len(self.given_links) + self.input_count + len(inner)
-        self.measures = tuple(measure for pair in pairs for measure in pair.number_kinds)
-        self.angle_measures = tuple(k for k, measure in enumerate(self.measures) if measure is Measure.ANGLE)
-        self.length_measures = tuple(k for k, measure in enumerate(self.measures) if measure is Measure.LENGTH)
-        self.blocks = tuple(stage for stage in e.blocks if slice_length(stage.rows) or slice_length(stage.unknowns))
-        self.closed_forms = [find_closed_form(e, stage) or linear_form(e, stage) for stage in self.blocks]
-        self.sign_count = sum(isinstance(form, ClosedForm) for form in self.closed_forms)
-        "how many groups of its equations have two assembly modes"
+        self.slot_count = len(self.given_links) + self.input_count + len(self.inner_links)
+        measures = [measure for pair in pairs for measure in pair.number_kinds]
+        self.angle_measures = tuple(k for k, measure in enumerate(measures) if measure is Measure.ANGLE)
+        self.length_measures = tuple(k for k, measure in enumerate(measures) if measure is Measure.LENGTH)
+        self.measure_count, self.number_count = len(measures), len(measures) + 2 * len(self.angle_measures)
+        "how many numbers of its pairs it takes: without, and with the cosine and sine of angles"
+        self.unknown_is_angle = tuple(e.coordinates[column].kind is not Measure.LENGTH for column in e.unknowns)
         self.is_square = e.is_square
-
-        self.has_closed_form = (
-            self.is_square and self.sign_count <= MAX_SIGNS and all(form is not None for form in self.closed_forms)
-        )
-        "whether all unknowns are in closed form, by formulas that can be compiled"
-        self.has_newton_formulas = False
+        stages = [stage for stage in e.blocks if slice_length(stage.unknowns)]
+        blocks = [KernelBlock(stage, find_closed_form(e, stage) or linear_form(e, stage)) for stage in stages]
+        forms = [block.closed_form for block in blocks if block.closed_form is not None]
+        self.sign_count = sum(form.sign.numel() for form in forms)
+        "how many blocks of its equations have two assembly modes"
+        self._texts: dict[tuple[bool, bool] | None, BlockText] = {}
+        has_forms = len(forms) == len(blocks) and self.sign_count <= MAX_SIGNS
+        self.has_closed_form = has_forms and self._can_be_written(blocks, (None, (False, False)))
+        "whether all unknowns are in closed form, by functions that can be compiled"
+        size = slice(0, e.z.numel())
+        together = KernelBlock(Block(size, size, self.inner_links, (), False, 0), None)
+        options = (False, False), (True, False)
+        self.has_newton_functions = not self.has_closed_form and self._can_be_written([together], options)
         "whether Newton's method can follow it, where it is not in closed form"
-        self._run_formulas: dict[tuple[bool, bool], BlockFormula] = {}
-        if self.has_closed_form:
-            try:
-                self.start_formula, self.run_formula(False)
-            except UnsupportedOperation:
-                self.has_closed_form = False
-        if self.is_square and not self.has_closed_form:
-            with suppress(UnsupportedOperation):
-                self.has_newton_formulas = self.newton_formulas is not None
+
+    def _can_be_written(self, blocks: Sequence[KernelBlock], options: Sequence[tuple[bool, bool] | None]) -> bool:
+        """Whether the functions of these options can be written with the equations in these blocks."""
+        if not self.is_square:
+            return False
+        given = self.given_links
+        self.kernel = KernelEquations(
+            self.equations, self.mechanism, given_links=given, blocks=tuple(blocks), turns_numbers=True
+        )
+        try:
+            for option in options:
+                self._write(option)
+        except (UnsupportedOperation, BareAngle):
+            return False
+        return True
+
+    def _write(self, option: tuple[bool, bool] | None) -> BlockText:
+        """The text of the start (None), or of the run with or without rates, polished or not."""
+        if option not in self._texts:
+            writer = _BlockTypeWriter(self, 1 if self.kernel.has_newton_blocks else LANES)
+            if option is None:
+                writer.write_start()
+            elif self.kernel.has_newton_blocks:
+                writer.write_newton_run(option[0])
+            else:
+                writer.write_run(*option)
+            self._texts[option] = writer.text
+        return self._texts[option]
 
     @property
-    def unknown_is_angle(self) -> tuple[bool, ...]:
-        """Of every unknown whether it is an angle."""
-        e = self.equations
-        return tuple(e.coordinates[column].kind is not Measure.LENGTH for column in e.unknowns)
-
-    @property
-    def number_count(self) -> int:
-        """How many numbers of its pairs it takes, with the cosine and sine of angles."""
-        return len(self.measures) + 2 * len(self.angle_measures)
-
-    @cached_property
-    def start_formula(self) -> BlockFormula:
+    def start_function(self) -> Any:
         """(given links and inputs, numbers with sums of the sketch) -> of the assembly mode nearest to the sketch x, y,
-        cos and sin of the inner links, then its signs, its squared distance, that of the next mode, its residual, and
-        the least distance measure of any mode from a dead point."""
-        work = FormulaBuilder(self)
-        sums = [
-            [work.add_input("p", self.number_count + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)]
-            for k in range(len(self.inner_links))
-        ]
-        modes = []
-        for signs in product((1.0, -1.0), repeat=self.sign_count):
-            sign_numbers = [work.instructions.add_constant(sign) for sign in signs]
-            assembly = work.closed_form_assembly(sign_numbers)
-            poses = work.poses(assembly)
-            residual, clear = work.acceptance_values(assembly, poses)
-            outputs = [*(number for pose in poses for number in pose), *sign_numbers, residual]
-            modes.append(_StartMode(outputs, work.sketch_distance(poses, sums), residual, clear))
-        *outputs, residual, nearest, second, least_clear = work.nearest_mode(modes)
-        return work.make_formula([*outputs, nearest, second, residual, least_clear])
+        cos and sin of the inner links; then in a slot behind them its signs, its squared distance, that of the next
+        mode, its residual, and the least distance measure of any mode from a dead point."""
+        return self._write(None).function
 
-    @cached_property
-    def newton_formulas(self) -> NewtonFormulas:
-        """The formulas by which Newton's method follows a type that is not in closed form. Raises
-        UnsupportedOperation."""
-        return NewtonFormulas(*(FormulaBuilder(self).newton_formula(rates) for rates in (None, False, True)))
-
-    def run_formula(self, rates: bool, polished: bool = False) -> BlockFormula:
-        """(given links and inputs, numbers) -> rows of the inner links, then the residual and the distance measure from
-        a dead point."""
-        if (rates, polished) not in self._run_formulas:
-            work = FormulaBuilder(self)
-            signs = [work.add_input("p", self.number_count + k) for k in range(self.sign_count)]
-            assembly = work.closed_form_assembly(signs, polished)
-            poses = work.poses(assembly)
-            outputs = [*work.link_rows(assembly, poses, rates), *work.acceptance_values(assembly, poses)]
-            self._run_formulas[rates, polished] = work.make_formula(outputs)
-        return self._run_formulas[rates, polished]
+    def run_function(self, rates: bool, polished: bool = False) -> Any:
+        """(given links and inputs, numbers) -> rows of the inner links; checked, see `BlockText`."""
+        return self._write((rates, polished and self.has_closed_form)).function
 
 
-class LinearForm(NamedTuple):
-    """A group of lengths that has one assembly: as `ClosedForm`, without a sign."""
-
-    values: tuple[tuple[ca.SX], ...]
-    coalescence: ca.SX
-
-
-def linear_form(e: ConstraintEquations, stage: Block) -> LinearForm | None:
-    """The only assembly of a group of one or two lengths whose constraints are linear in them; None for others."""
+def linear_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
+    """The only assembly, without a sign, of one or two lengths whose constraints are linear in them; else None."""
     count = slice_length(stage.unknowns)
-    lengths = all(e.coordinates[column].kind is Measure.LENGTH for column in e.unknowns[stage.unknowns])
-    if stage.is_free or count != slice_length(stage.rows) or count > 2 or not lengths:
+    are_lengths = all(e.coordinates[column].kind is Measure.LENGTH for column in e.unknowns[stage.unknowns])
+    if stage.is_free or count != slice_length(stage.rows) or count > 2 or not are_lengths:
         return None
     rows, unknowns = e.F[stage.rows], e.z[stage.unknowns]
     jacobian = ca.densify(ca.jacobian(rows, unknowns))
@@ -199,267 +182,212 @@ def linear_form(e: ConstraintEquations, stage: Block) -> LinearForm | None:
     if ca.jacobian_sparsity(jacobian, unknowns).nnz():
         return None
     values = -solve_by_determinants(jacobian, ca.substitute(rows, unknowns, ca.SX.zeros(count)))
-    if count == 1:
-        return LinearForm(((values,),), ca.SX(0.0))
-    det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
-    coalescence = 1.0 - det * det / (ca.sumsqr(jacobian[:, 0]) * ca.sumsqr(jacobian[:, 1]))
-    return LinearForm(tuple((values[k],) for k in range(count)), coalescence)
+    lengths = ca.vertcat(*(ca.sumsqr(column) for column in ca.horzsplit(jacobian)))
+    coalescence = ca.SX(0.0)
+    if count == 2:
+        det = jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0]
+        coalescence = 1.0 - det * det / (lengths[0] * lengths[1])
+    no_sign = ca.SX(0, 1)
+    return ClosedForm(tuple((value,) for value in ca.vertsplit(values)), no_sign, no_sign, coalescence, lengths)
 
 
 NAN_PROBE = 1e-300
 """A number times it is negligible beside round-off; NaN and infinity times it are not."""
-
-
 FAR_AWAY = 1e300
 """A squared distance, greater than any residual of an assembly."""
 
 
-class SymbolicAssembly(NamedTuple):
-    """An assembly of a block type: the numbers of the values that stand for its unknowns, and of its coalescences."""
+class _BlockTypeWriter(KernelWriter):
+    """Writes the functions of a block type."""
 
-    z: list[int]
-    cos_sin: dict[int, CosSin]
-    coalescences: list[int]
+    def __init__(self, block_type: BlockType, lanes: int):
+        super().__init__(block_type.kernel, (), False, lanes, frozenset({"p", "pc", "ps"}), frozenset())
+        self.block_type, self.text = block_type, BlockText(self.ir)
+        first = block_type.slot_count - len(block_type.inner_links)
+        self.inner_slots = range(first, block_type.slot_count)
 
+    def coalescence(self, form: ClosedForm) -> ca.SX:
+        """How near the two assemblies of a closed form are to where they meet."""
+        return form.coalescence
 
-Value = TypeVar("Value", int, str)
+    def write_run(self, rates: bool, polished: bool) -> None:
+        """The run in closed form; `polished` by a step of Newton's method."""
+        self.text.begin_steps(len(self.inner_slots))
+        first = self.block_type.number_count
+        signs = {("sign", k): self.text.number(first + k) for k in range(self.block_type.sign_count)}
+        names = self._load_operands(rates) | signs
+        clear = self._write_closed_forms(names, polished)
+        rows, residual = self._write_links(names, rates)
+        self._end_run(rows, self.ir.compare("ole", residual, self.text.tolerance), clear)
 
-
-def rotate(
-    add: Callable[[str, Value, Value], Value], constant: Callable[[float], Value], c: Value, s: Value, angle: Value
-) -> tuple[Value, Value]:
-    """The cos and sin of an angle moved on by another one: by the rational rotation, the same to third order.
-
-    `add` writes an operation, and `constant` a number.
-    """
-    half = add("mul", constant(0.5), angle)
-    square = add("mul", half, half)
-    scale = add("div", constant(1.0), add("add", constant(1.0), square))
-    cos, sin = add("mul", add("sub", constant(1.0), square), scale), add("mul", angle, scale)
-    return (
-        add("sub", add("mul", c, cos), add("mul", s, sin)),
-        add("add", add("mul", s, cos), add("mul", c, sin)),
-    )
-
-
-class _StartMode(NamedTuple):
-    """Values of one assembly mode by their numbers: its outputs, its squared distance to the sketch, its residual, and
-    its distance measure from a dead point."""
-
-    outputs: list[int]
-    distance: int
-    residual: int
-    clear: int
-
-
-class FormulaBuilder:
-    """Writes the formulas of a block type into one list of instructions."""
-
-    def __init__(self, block_type: BlockType):
-        self.block_type, self.equations = block_type, block_type.equations
-        self.instructions: InstructionList[FormulaInput] = InstructionList()
-        e, given, measures = self.equations, len(block_type.given_links), block_type.measures
-        self.symbols = [e.u, e.p, ca.SX.sym("u1", e.u.numel()), ca.SX.sym("u2", e.u.numel())]
-        self.u: list[int] = []
-        self.cos_sin: dict[int, CosSin] = {}
-        for k in range(e.u.numel()):
-            slot, part = (k // 3, k % 3) if k < 3 * given else (given + k - 3 * given, 0)
-            self.u.append(self.add_input("angle", slot) if part == 2 else self.add_input("row", slot, part))
-            if part == 2 or e.input_kinds[k] is not Measure.LENGTH:
-                self.cos_sin[self.u[-1]] = CosSin(self.add_input("row", slot, COS), self.add_input("row", slot, SIN))
-        self.p = [self.add_input("p", k) for k in range(len(measures))]
-        for place, k in enumerate(block_type.angle_measures):
-            both = (self.add_input("p", len(measures) + 2 * place + part) for part in (0, 1))
-            self.cos_sin[self.p[k]] = CosSin(*both)
-        rows = [(k // 3, X1 + k % 3, X2 + k % 3) if k < 3 * given else (given + k - 3 * given, X1, X2)
-                for k in range(e.u.numel())]  # fmt: skip
-        self.u1 = [self.add_input("row", slot, first) for slot, first, _ in rows]
-        self.u2 = [self.add_input("row", slot, second) for slot, _, second in rows]
-        pairs = {pair.name: pair for pair in block_type.mechanism.pairs}
-        self.inner_frames, self.pair_coordinates = frames_from_coordinates(
-            ca.vertsplit(e.w), coordinate_columns(e.coordinates), block_type.inner_links, pairs
+    def write_newton_run(self, rates: bool) -> None:
+        """The run by Newton's method, all unknowns together, step after step."""
+        t, text, first = self.ir, self.text, self.block_type.number_count
+        (part,) = self.equations.blocks
+        self.allocate_newton_state(self.state_operands())
+        self.allocate_linear_systems()
+        self.regularity_slot = t.allocate()
+        self.store_start({leaf: text.number(first + 2 * leaf[1] + (leaf[0] == "zs")) for leaf in self.state_slots})
+        text.begin_steps(len(self.inner_slots))
+        names = self._load_operands(rates)
+        row = t.double_pointer(text.slot(self.block_type.slot_count), t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS}"))
+        *weights, count, limit = (
+            t.add_instruction(f"load double, ptr {t.double_pointer(row, str(k))}") for k in range(TABLE_COLUMNS)
         )
-        "of the inner links, and of pairs by name, in the unknowns"
+        self.predictor_weights = [t.broadcast(weight) for weight in weights]
+        t.store(t.constant(1.0), self.regularity_slot)
+        self.begin_newton_step()
+        self.write_prediction(part)
+        self.write_corrections(part, names, t.add_instruction(f"fptosi double {count} to i64"))
+        rows, residual = self._write_links(names, rates)
+        is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast(limit))
+        is_good = t.and_flags(t.compare("ole", residual, text.tolerance), is_near)
+        self._end_run(rows, is_good, t.load(self.regularity_slot))
+        if self.linear_systems is not None:
+            t.write_line(self.linear_systems.function_text)
 
-    def add_input(self, source: str, place: int, part: int = 0) -> int:
-        """Add an input; "angle" and "unknown" are represented by their cos and sin."""
-        return self.instructions.add_input(FormulaInput(source, place, part))
+    def write_rotation(self, cos: str, sin: str, angle: str) -> tuple[str, str]:
+        """The cos and sin of an angle that Newton's method turns, at the start by much."""
+        # back onto the circle, which rounding leaves
+        return write_normalised(self.ir, *write_rational_rotation(self.ir, cos, sin, angle))
 
-    def add_unknown(self) -> int:
-        """Add a new value, represented by its cos and sin, or by its parts."""
-        return self.add_input("unknown", len(self.instructions.instructions))
+    def _end_run(self, rows: list[list[str]], is_good: str, clear: str) -> None:
+        """Store the rows of the inner links, and judge the steps."""
+        self._store_links(rows)
+        directions = [LinkDirection(row[COS], row[SIN], None) for row in rows]
+        self.text.end_checked_steps(is_good, directions, clear, LEAST_COSINE)
 
-    def _inline(self, outputs: list[ca.SX], z: list[int], further: Sequence[tuple[ca.SX, list[int]]] = ()) -> list[int]:
-        """The values of expressions in z, u, p, u1, u2 and further symbols, each with its numbers."""
-        column = ca.densify(ca.vertcat(*outputs))
-        symbols, numbers = [symbol for symbol, _ in further], [values for _, values in further]
-        function = ca.Function("part", [self.equations.z, *self.symbols, *symbols], [column], {"cse": True})
-        return inline_function(self.instructions, function, [z, self.u, self.p, self.u1, self.u2, *numbers])[0]
+    def _store_links(self, rows: list[list[str]]) -> None:
+        for slot, row in zip(self.inner_slots, rows, strict=True):
+            self.text.store_rows(row, [(slot, k) for k in range(len(row))])
 
-    def closed_form_assembly(self, signs: Sequence[int], polished: bool = False) -> SymbolicAssembly:
-        """The unknowns, group after group, by their closed forms; polished by a step of Newton's method."""
-        e, first = self.equations, len(self.instructions.instructions)
-        z = [self.add_input("unknown", first, k) for k in range(e.z.numel())]
-        cos_sin, coalescences, unused_signs = {}, [], iter(signs)
-        for stage, form in zip(self.block_type.blocks, self.block_type.closed_forms, strict=True):
-            assert form is not None
-            outputs = [*(part for value in form.values for part in value), form.coalescence]
-            sign = [(form.sign, [next(unused_signs)])] if isinstance(form, ClosedForm) else []
-            values = iter(self._inline(outputs, z, sign))
-            columns = range(stage.unknowns.start, stage.unknowns.stop)
-            parts = {k: [next(values) for _ in value] for k, value in zip(columns, form.values, strict=True)}
-            coalescences.append(next(values))
-            if polished:
-                parts = self._polish(stage, z, parts)
-            for k, value in parts.items():
-                if len(value) == 2:
-                    self.cos_sin[z[k]] = cos_sin[k] = CosSin(*value)
-                else:
-                    z[k] = value[0]
-        return SymbolicAssembly(z, cos_sin, coalescences)
-
-    def newton_formula(self, rates: bool | None) -> BlockFormula:
-        """One of the formulas of `NewtonFormulas`: None for the step, else the rows of links without or with rates."""
-        e, kind = self.equations, self.block_type
-        z, cos_sin = [], {}
-        for k, is_angle in enumerate(kind.unknown_is_angle):
-            z.append(self.add_unknown() if is_angle else self.add_input("z", k, 0))
+    def _load_operands(self, rates: bool) -> OperandNames:
+        """Load the poses of the given links, the inputs, with their rates, and the numbers of the pairs."""
+        text, kind, names = self.text, self.block_type, OperandNames()
+        given = 3 * len(kind.given_links)
+        for k, is_angle in enumerate(self.equations.input_is_angle):
+            slot, part = divmod(k, 3) if k < given else (len(kind.given_links) + k - given, 0)
+            if part < 2:
+                names["u", k] = text.load_row(slot, part)
             if is_angle:
-                cos_sin[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", k, 0), self.add_input("z", k, 1))
-        if rates is None:
-            step, square, *lengths = solve_with_volume(ca.densify(ca.jacobian(e.F, e.z)), e.F)
-            strength = square / lengths[0] if lengths else square
-            return self.make_formula(self._inline([step, strength], z))
-        assembly = SymbolicAssembly(z, cos_sin, [])
-        poses = self.poses(assembly)
-        residual, _ = self.acceptance_values(assembly, poses)
-        return self.make_formula([*self.link_rows(assembly, poses, rates), residual])
+                names["uc", k], names["us", k] = (text.load_row(slot, row) for row in (COS, SIN))
+            if rates:
+                names["u1", k], names["u2", k] = (text.load_row(slot, row + part) for row in (X1, X2))
+        names |= {("p", k): text.number(k) for k in range(kind.measure_count)}
+        for place, k in enumerate(kind.angle_measures):
+            first = kind.measure_count + 2 * place
+            names["pc", k], names["ps", k] = text.number(first), text.number(first + 1)
+        return names
 
-    def link_rows(self, assembly: SymbolicAssembly, poses: list[list[int]], rates: bool) -> list[int]:
+    def _write_closed_forms(self, names: OperandNames, polished: bool = False) -> str:
+        """The unknowns, block after block, put into `names`; the least distance measure from a dead point."""
+        t, e = self.ir, self.equations.equations
+        clear = t.constant(1.0)
+        for part in self.equations.blocks:
+            distance = t.binary("sub", t.constant(1.0), self.write_closed_form(part, names))
+            clear = t.call_intrinsic("minnum", clear, distance)
+            if polished:
+                turning = [k for k in part.unknowns if self.equations.is_angle[k]]
+                for k in turning:
+                    c, s = names["zc", k], names["zs", k]
+                    square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
+                    size = t.call_intrinsic("sqrt", square)
+                    names["zc", k], names["zs", k] = t.binary("div", c, size), t.binary("div", s, size)
+                jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
+                steps = self.write_values([solve_by_determinants(jacobian, e.F[part.block.rows])], names)
+                for k, step in zip(part.unknowns, steps, strict=True):
+                    if k in turning:
+                        back = t.add_instruction(f"fneg {t.vector} {step}")
+                        both = write_rational_rotation(t, names["zc", k], names["zs", k], back)
+                        names["zc", k], names["zs", k] = both
+                    else:
+                        names["z", k] = t.binary("sub", names["z", k], step)
+        return clear
+
+    def _write_links(self, names: OperandNames, rates: bool = False) -> tuple[list[list[str]], str]:
         """The rows of the inner links: their poses, each followed by its rates if they are wanted: x', y', angle', then
-        the second ones."""
-        if not rates:
-            return [number for pose in poses for number in pose]
-        e, (u1, u2), count = self.equations, self.symbols[2:], 3 * len(poses)
-        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
-        w1, w2 = first_and_second_rates(e.w[:count], e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
-        values = self._inline([w1, w2], assembly.z)
-        rows: list[int] = []
-        for k, pose in enumerate(poses):
-            rows += [*pose, *values[3 * k : 3 * k + 3], *values[count + 3 * k : count + 3 * k + 3]]
-        return rows
-
-    def _polish(self, stage: Block, z: list[int], parts: dict[int, list[int]]) -> dict[int, list[int]]:
-        """The unknowns of a group after a step of Newton's method, angles rotated by the rational rotation."""
-        e, add = self.equations, self.instructions.add
-        near = list(z)
-        for k, value in parts.items():
-            if len(value) == 2:
-                c, s = value
-                size = add("sqrt", add("add", add("mul", c, c), add("mul", s, s)))
-                parts[k] = [add("div", c, size), add("div", s, size)]
-                near[k] = self.add_unknown()
-                self.cos_sin[near[k]] = CosSin(*parts[k])
-            else:
-                near[k] = value[0]
-        jacobian = block_jacobian(e, stage.rows, stage.unknowns)
-        steps = self._inline([solve_by_determinants(jacobian, e.F[stage.rows])], near)
-        return {
-            k: [add("sub", value[0], step)]
-            if len(value) == 1
-            else [*rotate(add, self.instructions.add_constant, value[0], value[1], add("neg", step))]
-            for (k, value), step in zip(parts.items(), steps, strict=True)
-        }
-
-    def poses(self, assembly: SymbolicAssembly) -> list[list[int]]:
-        """x, y, cos and sin of every inner link."""
-        parts = [ca.SX(part) for frame in self.inner_frames.values() for part in frame[:POSE_ROWS]]
-        values = self._inline(parts, assembly.z)
-        return [values[first : first + POSE_ROWS] for first in range(0, len(values), POSE_ROWS)]
-
-    def _residuals(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
-        """The residual of every constraint by the formulas of the pairs, independent of the elimination.
-
-        Of an angle that closes modulo a turn |sin| + 1 - cos; of cos and sin of an unknown, how far from the circle.
-        """
-        e, kind = self.equations, self.block_type
-        places = ca.SX.sym("places", 3 * len(kind.inner_links))
-        place_numbers: list[int] = []
-        for x, y, c, s in poses:
-            place_numbers += [x, y, self.add_unknown()]
-            self.cos_sin[place_numbers[-1]] = CosSin(c, s)
-        first_input = 3 * len(kind.given_links)
-        split = [*ca.vertsplit(e.u)[:first_input], *ca.vertsplit(places)]
-        names = (*kind.given_links, *kind.inner_links)
-        frames = {name: frame_at(*split[3 * k : 3 * k + 3]) for k, name in enumerate(names)} | {"frame": GROUND}
-        errors = closing_errors(e, kind.mechanism, frames, self.pair_coordinates, first_input)
-        values = self._inline([errors], assembly.z, [(places, place_numbers)])
-        add = self.instructions.add
-        for c, s in assembly.cos_sin.values():
-            square = add("add", add("mul", c, c), add("mul", s, s))
-            values.append(add("sub", square, self.instructions.add_constant(1.0)))
-        return values
-
-    def acceptance_values(self, assembly: SymbolicAssembly, poses: list[list[int]]) -> list[int]:
-        """The largest residual, and the least distance measure from a dead point."""
-        add = self.instructions.add
-        largest = total = self.instructions.add_constant(0.0)
-        for residual in self._residuals(assembly, poses):
-            size = add("abs", residual)
-            largest, total = add("maxnum", largest, size), add("add", total, size)
+        the second ones; and the largest residual."""
+        t, e, s, links = self.ir, self.equations.equations, self.symbols, self.block_type.inner_links
+        poses = ca.vertcat(*(ca.SX(part) for link in links for part in self.equations.frames[link][:POSE_ROWS]))
+        outputs: list[ca.SX] = [self.equations.residuals(), poses]
+        if rates:
+            z1, z2 = self.equations.rates(s["u1"], s["u2"])
+            y1, y2 = ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
+            outputs += first_and_second_rates(e.w[: 3 * len(links)], e.y, y1, y2)
+        residuals, *orders = self.write_separately(outputs, names)
+        rows = [
+            [value for k, order in enumerate(orders) for value in _part_of(order, link, 3 if k else POSE_ROWS)]
+            for link in range(len(links))
+        ]
+        largest = total = t.constant(0.0)
+        for residual in (*residuals, *self.write_circle_residuals(names)):
+            size = t.call_intrinsic("fabs", residual)
+            largest, total = t.call_intrinsic("maxnum", largest, size), t.binary("add", total, size)
         # NaN stays in a sum, but not in the largest
-        largest = add("add", largest, add("mul", self.instructions.add_constant(NAN_PROBE), total))
-        clear = self.instructions.add_constant(1.0)
-        for k, coalescence in enumerate(assembly.coalescences):
-            distance = add("sub", self.instructions.add_constant(1.0), coalescence)
-            clear = add("minnum", clear, distance) if k else distance
-        return [largest, clear]
+        return rows, t.binary("add", largest, t.binary("mul", t.constant(NAN_PROBE), total))
 
-    def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
-        """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
-        add, mul = self.instructions.add, partial(self.instructions.add, "mul")
-        total = self.instructions.add_constant(0.0)
-        for (x, y, c, s), (count, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
-            square = add("add", mul(x, x), mul(y, y))
-            rotated = add("sub", mul(c, px), mul(s, py)), add("add", mul(s, px), mul(c, py))
-            mixed = add("add", mul(x, add("sub", rotated[0], tx)), mul(y, add("sub", rotated[1], ty)))
-            mixed = add("sub", mixed, add("add", mul(c, along), mul(s, across)))
-            link_sum = add("add", add("add", mul(count, square), add("add", mixed, mixed)), squares)
-            total = add("add", total, link_sum)
+    def write_start(self) -> None:
+        """The start: all assembly modes, and of them the nearest to the sketch."""
+        t, text, kind = self.ir, self.text, self.block_type
+        text.begin_steps()
+        operands, count = self._load_operands(False), len(self.inner_slots)
+        sums = [
+            [text.number(kind.number_count + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)] for k in range(count)
+        ]
+        far = t.constant(FAR_AWAY)
+        outputs, nearest, second, least_clear = list[str](), far, far, t.constant(inf)
+        for signs in product((1.0, -1.0), repeat=kind.sign_count):
+            sign_names = {("sign", k): t.constant(sign) for k, sign in enumerate(signs)}
+            names: OperandNames = operands | sign_names
+            clear = self._write_closed_forms(names)
+            rows, residual = self._write_links(names)
+            mode = [*(value for row in rows for value in row), *sign_names.values(), residual]
+            # a mode that cannot be assembled is far away
+            distance = t.select(t.compare("olt", residual, far), self._write_sketch_distance(rows, sums), far)
+            is_nearer = t.compare("olt", distance, nearest)
+            outputs = [t.select(is_nearer, *both) for both in zip(mode, outputs, strict=True)] if outputs else mode
+            second = t.call_intrinsic("minnum", second, t.call_intrinsic("maxnum", nearest, distance))
+            nearest = t.call_intrinsic("minnum", nearest, distance)
+            least_clear = t.call_intrinsic("minnum", least_clear, t.call_intrinsic("fabs", clear))
+        places = [(slot, row) for slot in self.inner_slots for row in range(POSE_ROWS)]
+        places += [(kind.slot_count, k) for k in range(kind.sign_count + JUDGED_ROWS)]
+        *outputs, residual = outputs
+        text.store_rows([*outputs, nearest, second, residual, least_clear], places)
+        text.end_steps()
+
+    def _write_sketch_distance(self, rows: list[list[str]], sums: list[list[str]]) -> str:
+        """The squared distance of the links' points to the sketch, from the sums of its points."""
+        t = self.ir
+        add, sub, mul = (partial(t.binary, what) for what in ("add", "sub", "mul"))
+        total = t.constant(0.0)
+        for (x, y, c, s), (count, px, py, tx, ty, along, across, squares) in zip(rows, sums, strict=True):
+            rotated = sub(mul(c, px), mul(s, py)), add(mul(s, px), mul(c, py))
+            mixed = add(mul(x, sub(rotated[0], tx)), mul(y, sub(rotated[1], ty)))
+            mixed = sub(mixed, add(mul(c, along), mul(s, across)))
+            square = mul(count, add(mul(x, x), mul(y, y)))
+            total = add(total, add(add(square, add(mixed, mixed)), squares))
         return total
 
-    def nearest_mode(self, modes: Sequence[_StartMode]) -> list[int]:
-        """The outputs of the assembly mode nearest to the sketch, its squared distance, the next squared distance, and
-        the least distance measure of any mode from a dead point. A mode that cannot be assembled is `FAR_AWAY`."""
-        add = self.instructions.add
-        far = self.instructions.add_constant(FAR_AWAY)
-        distances = []
-        for mode in modes:
-            is_joined = add("less", mode.residual, far)
-            distances.append(
-                add("add", add("where", is_joined, mode.distance), add("where", add("not", is_joined), far))
-            )
-        outputs, nearest, second, clear = modes[0].outputs, distances[0], far, add("abs", modes[0].clear)
-        for mode, distance in zip(modes[1:], distances[1:], strict=True):
-            is_nearer = add("less", distance, nearest)
-            stays = add("not", is_nearer)
-            outputs = [
-                add("add", add("where", is_nearer, new), add("where", stays, old))
-                for new, old in zip(mode.outputs, outputs, strict=True)
-            ]
-            second = add("minnum", second, add("maxnum", nearest, distance))
-            nearest = add("minnum", nearest, distance)
-            clear = add("minnum", clear, add("abs", mode.clear))
-        return [*outputs, nearest, second, clear]
 
-    def make_formula(self, wanted: list[int]) -> BlockFormula:
-        """The formula of wanted values. Raises UnsupportedOperation where an angle stands outside cos and sin, or it is
-        long."""
-        formula = BlockFormula(*expand_angle_sums(self.instructions, wanted, self.cos_sin))
-        check_length(len(formula.order))
-        if any(leaf.source in ("angle", "unknown") for leaf in formula.inputs.values()):
-            raise UnsupportedOperation("an angle stands outside cos and sin")
-        return formula
+def _part_of(values: Sequence[str], index: int, size: int) -> Sequence[str]:
+    return values[size * index : size * (index + 1)]
+
+
+def step_table(steps: int, step: float) -> Array:
+    """Of every step of such a length the weights of the steps before, how often it is corrected, and by how much at
+    most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
+    table = np.empty((steps, TABLE_COLUMNS))
+    table[:, :PREDICTOR_ORDER] = prediction_weights(steps)
+    table[:, -2:] = CORRECTIONS, correction_limit(step)
+    table[: PREDICTOR_ORDER + 1, -2], table[:PREDICTOR_ORDER, -1] = FIRST_CORRECTIONS, inf
+    return table
+
+
+def newton_numbers(block_type: BlockType, p: Array, start: Array) -> Array:
+    """The numbers of blocks without closed form: p (blocks, numbers) and unknowns to start from (blocks, unknowns)."""
+    is_angle = block_type.unknown_is_angle
+    both = np.stack([np.where(is_angle, np.cos(start), start), np.where(is_angle, np.sin(start), 0.0)], axis=2)
+    return np.hstack([p, both.reshape(len(p), -1)])
 
 
 @lru_cache(maxsize=MAX_BLOCK_TYPES)
@@ -480,15 +408,3 @@ def write_formula(inputs: Sequence[Sequence[FormulaInput]], write: Callable[...,
     function = ca.Function("written", symbols, [ca.densify(ca.vertcat(*write(*symbols)))], {"cse": True})
     (outputs,) = inline_function(listing, function, [[listing.add_input(leaf) for leaf in group] for group in inputs])
     return BlockFormula(listing, outputs)
-
-
-class NewtonFormulas(NamedTuple):
-    """Functions of given links and inputs, numbers, and unknowns (the cosine and sine of angles, or a length and 0).
-
-    `step`: the step of Newton's method to subtract, and the square of the regularity of the Jacobian; `poses` and
-    `poses_and_rates`: rows of the inner links, and the largest residual.
-    """
-
-    step: BlockFormula
-    poses: BlockFormula
-    poses_and_rates: BlockFormula

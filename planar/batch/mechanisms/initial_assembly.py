@@ -9,10 +9,20 @@ import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_at_sketch, is_surely_farther
 from planar.batch.march.prediction import CLEAR_REGULARITY
-from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, SKETCH_SUMS, BlockType, X
+from planar.batch.mechanisms.block_type import (
+    COS,
+    JUDGED_ROWS,
+    MAX_SIGNS,
+    POSE_ROWS,
+    SIN,
+    SKETCH_SUMS,
+    BlockType,
+    X,
+    newton_numbers,
+    step_table,
+)
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
-from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
-from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
+from planar.codegen.tape import LANES, Tape, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
@@ -73,10 +83,6 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Ar
     return is_sure, block_numbers
 
 
-JUDGED_ROWS = 4
-"""Number of rows after the signs in the result of `BlockType.start_formula`."""
-
-
 class _ShownBlocks(NamedTuple):
     """Unknowns of blocks where they are shown (blocks, unknowns), and which of them are (blocks,)."""
 
@@ -116,12 +122,10 @@ class _Starts:
                 )
                 values = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
                 self.p[indices, : values.shape[1]] = values
-                rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
-                rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
-                self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
+                self.functions.append(kind.start_function)
             else:
                 self.slots[indices, kind.slot_count] = self.table.ctypes.data
-                self.functions.append(compile_newton_block(kind, False))
+                self.functions.append(kind.run_function(False))
         if not all(batch.block_type.has_closed_form for batch in linkages.batches):
             self.frames = _shown_frames(linkages, self.first)
             self._take_frames()

@@ -256,7 +256,7 @@ class _Partitioner:
         rows: dict[BlockType, list[int]] = {}
         for k, block in enumerate(self.blocks):
             rows.setdefault(block.block_type, []).append(k)
-        if not all(block_type.has_closed_form or block_type.has_newton_formulas for block_type in rows):
+        if not all(block_type.has_closed_form or block_type.has_newton_functions for block_type in rows):
             raise NotPartitionable("formulas are too long to be compiled")
         block_rows = {
             block_type: BlockRows(
