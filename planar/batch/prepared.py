@@ -10,8 +10,8 @@ import numpy as np
 
 from planar.batch.design_arrays import design_variables
 from planar.batch.gradients.run_gradients import RunGradient, RunWeights, read_names, read_weights
-from planar.batch.prepare.compiled_runs import prepare_point_runs
-from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING
+from planar.batch.prepare.compiled_runs import ALL_SOLVED, STATUS_OF_ENDING
+from planar.batch.prepare.stages import prepare_point_runs
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.sweep import check_range, sweep

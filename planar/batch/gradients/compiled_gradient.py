@@ -23,19 +23,15 @@ from planar.batch.gradients.marched_slopes import numbers_of_file, with_rates
 from planar.batch.march.kernel import KernelInstructions, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.batch.prepare.compiled_runs import (
-    BoundRun,
-    MakeNumbers,
-    RunPositions,
-    run_stages,
-)
-from planar.batch.prepare.design_numbers import DesignNumbers
-from planar.batch.prepare.run_code import (
     LANES,
     RUN_ARGUMENTS,
     RUN_FUNCTION,
     RUN_TYPES,
     STAGE_ARGUMENTS,
+    BoundRun,
     CompiledRun,
+    MakeNumbers,
+    RunPositions,
     RunStages,
     begin_run,
     end_function,
@@ -46,6 +42,8 @@ from planar.batch.prepare.run_code import (
     write_expressions,
     write_shifted_inputs,
 )
+from planar.batch.prepare.design_numbers import DesignNumbers
+from planar.batch.prepare.stages import run_stages
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter

@@ -11,8 +11,15 @@ import numpy as np
 from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
 from planar.batch.general_path import OUTCOMES, point_rows, run_design
 from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
-from planar.batch.prepare.compiled_runs import CompiledRuns, address_of, prepare_runs
-from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE, padded_width
+from planar.batch.prepare.compiled_runs import (
+    ALL_SOLVED,
+    STATUS_OF_ENDING,
+    UNSURE,
+    CompiledRuns,
+    address_of,
+    padded_width,
+    prepare_runs,
+)
 from planar.batch.reference_design import ReferenceDesign
 from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
 from planar.derivatives.parameters import Parameters

@@ -145,7 +145,7 @@ class _DesignsKernelWriter(KernelWriter):
             if part.closed_form is None:
                 self._write_newton_block(part, have)
             else:
-                flags += self._write_closed_form_block(part, have)
+                flags.append(self._write_closed_form_block(part, have))
         flags += self._write_stops(have)
         flags += self._write_turns(have)
         t.write_line("br label %told")
@@ -224,8 +224,8 @@ class _DesignsKernelWriter(KernelWriter):
         t.store(t.constant(1.0), self.regularity_slot)
         self.begin_newton_step()
 
-    def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
-        """A block in closed form; flags that say where its two assemblies keep apart."""
+    def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> str:
+        """A block in closed form; a flag that says where its two assemblies keep apart."""
         if self.request.point_blocks is not None:
             self._write_other_assembly(part, have)
         form, coalescence = part.closed_form, self.write_closed_form(part, have)
@@ -236,13 +236,11 @@ class _DesignsKernelWriter(KernelWriter):
         if self.request.counts_candidates:
             self.apart_here.append(self.write_apart_here(part, coalescence, have))
         slots = self.bend_slots[self.sign_index[part.block.block_index]]
-        flags = [self._write_keeps_below(self.write_slow_nearness(part, have), slots, form)]
-        if form.margin is not None:
-            regular = self.ir.constant(1.0 - LEAST_KERNEL_REGULARITY**2)
-            flags.append(self.ir.compare("ole", coalescence, regular))
-        return flags
+        return self._write_keeps_below(self.write_slow_nearness(part, have), slots, form, coalescence)
 
-    def _write_keeps_below(self, value: str, slots: Sequence[str], form: ClosedForm | None = None) -> str:
+    def _write_keeps_below(
+        self, value: str, slots: Sequence[str], form: ClosedForm | None = None, coalescence: str | None = None
+    ) -> str:
         """A flag: what reaches one at a dead point or a stop (a cosine: one or minus one) keeps below it, between steps
         too.
 
@@ -252,7 +250,9 @@ class _DesignsKernelWriter(KernelWriter):
         previous, earlier = (t.load(slot) for slot in slots)
         for slot, new in zip(slots, (value, previous), strict=True):
             t.store(new, slot)
-        return write_keeps_apart(t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), form)
+        return write_keeps_apart(
+            t, earlier, previous, value, t.broadcast_counter_test("%k", "sgt", 1), form, coalescence
+        )
 
     def _write_turns(self, have: OperandNames) -> list[str]:
         """A flag that says where no link that carries other blocks has turned far since the step before: farther apart,

@@ -318,14 +318,21 @@ def write_closes(t: IRWriter, residuals: Sequence[str], tolerance: str) -> str:
 
 
 def write_keeps_apart(
-    t: IRWriter, earlier: str, previous: str, current: str, is_known: str | None = None, form: ClosedForm | None = None
+    t: IRWriter,
+    earlier: str,
+    previous: str,
+    current: str,
+    is_known: str | None = None,
+    form: ClosedForm | None = None,
+    coalescence: str | None = None,
 ) -> str:
     """A flag: over three positions, and between them, the two assemblies of a block keep apart, by what reaches one
     where they meet: of a closed form its `slow_nearness`.
 
     Between them it does not reach one, by half as much as it bends over all three. So it may be the position before at
     which a block had come too near, and the middle of its change may lie there, as where a run starts just before a
-    dead point. `is_known`: flags of whether there are three positions already.
+    dead point. `is_known`: flags of whether there are three positions already. `coalescence`: of a form with a margin,
+    which says nothing of how regular a position is, at the last one.
     """
     maximum = 1.0 - LEAST_KERNEL_REGULARITY**2
     change = t.binary("sub", t.binary("add", current, earlier), t.binary("add", previous, previous))
@@ -336,11 +343,15 @@ def write_keeps_apart(
     if form is not None and form.cosine is not None:
         earlier, previous, current = (t.call_intrinsic("fabs", value) for value in (earlier, previous, current))
         maximum = sqrt(maximum)
-    elif form is not None:  # a margin says nothing of how regular a position is
+    elif form is not None:
         maximum = 1.0 - LEAST_START_REGULARITY**2
     greatest = t.greater(earlier, t.greater(previous, current))  # NaN in `current` stays
     reached = t.binary("add", greatest, t.binary("mul", change, half))
-    return t.compare("ole", reached, t.constant(maximum))
+    keeps_apart = t.compare("ole", reached, t.constant(maximum))
+    if form is None or form.margin is None or coalescence is None:
+        return keeps_apart
+    is_regular = t.compare("ole", coalescence, t.constant(1.0 - LEAST_KERNEL_REGULARITY**2))
+    return t.and_flags(keeps_apart, is_regular)
 
 
 def write_turns_little(t: IRWriter, angles: Sequence[str], slots: Sequence[str]) -> list[str]:
