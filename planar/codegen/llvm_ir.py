@@ -130,6 +130,10 @@ class IRWriter:
         self.write_line(f"%{counter}more = icmp slt i64 %{counter}next, %{last}")
         self.write_line(f"br i1 %{counter}more, label %{again}, label %{after}")
 
+    def end_function(self) -> None:
+        """Return from the function and end it."""
+        self.lines += ["ret void", "}"]
+
     def add_all(self, of: Sequence[str]) -> str:
         """The sum of values."""
         total = of[0]

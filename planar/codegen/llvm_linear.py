@@ -108,8 +108,7 @@ class _LoopWriter(IRWriter):
 
     def end(self) -> list[str]:
         """The lines of the function."""
-        self.write_line("ret void")
-        self.write_line("}")
+        self.end_function()
         return self.lines
 
 

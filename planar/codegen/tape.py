@@ -282,7 +282,8 @@ class BlockText:
         self.ir.write_line("br label %next")
         self.ir.write_label("next")
         self.ir.close_loop("k", "vectors", "step", "done")
-        self._end()
+        self.ir.write_label("done")
+        self.ir.end_function()
 
     def end_checked_steps(
         self, is_good: str, directions: Sequence[LinkDirection], clear: str, least_cosine: float
@@ -333,13 +334,9 @@ class BlockText:
         place = t.add_instruction("getelementptr i64, ptr %ended, i64 2")
         t.write_line(f"store i64 {t.add_instruction(f'zext i1 {flag} to i64')}, ptr {place}")
         t.write_line("br label %done")
-        self._end()
-        t.write_line(f"declare {byte} @llvm.cttz.{byte}({byte}, i1)")
-
-    def _end(self) -> None:
         self.ir.write_label("done")
-        self.ir.write_line("ret void")
-        self.ir.write_line("}")
+        self.ir.end_function()
+        t.write_line(f"declare {byte} @llvm.cttz.{byte}({byte}, i1)")
 
     def _pick(self, predicate: str, a: str, b: str) -> str:
         return self.ir.select(self.ir.compare(predicate, a, b), a, b)

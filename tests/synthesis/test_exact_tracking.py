@@ -9,7 +9,8 @@ import pytest
 
 import planar
 from planar.assemblies.polynomial.path_tracker import normalize, track_paths
-from planar.codegen.formula_kernel import LANES, ComplexKernel
+from planar.codegen.complex_kernel import ComplexKernel
+from planar.codegen.formula_kernel import LANES
 from planar.synthesis.exact import exact_synthesis
 from planar.synthesis.exact.relations.exact_numbers import exact_number
 from planar.synthesis.exact.relations.exact_problem import ExactProblem

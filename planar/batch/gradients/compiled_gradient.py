@@ -34,7 +34,6 @@ from planar.batch.prepare.compiled_runs import (
     RunPositions,
     RunStages,
     begin_run,
-    end_function,
     end_run,
     input_rows,
     load_constant,
@@ -169,7 +168,7 @@ class _AdjointWriter(KernelWriter):
         for k, slot in enumerate(slots):
             total = t.reduce("fadd", t.load(slot))
             t.write_line(f"store double {total}, ptr {t.double_pointer('%sums', str(k))}")
-        end_function(t)
+        t.end_function()
 
     def _load_states(self) -> OperandNames:
         """The states at a block of positions; behind the last one it is repeated."""
@@ -238,7 +237,7 @@ class GradientWriter:
         function, context = (load_constant(stage, constants, name) for name in ("run", "constants"))
         arguments = "ptr %places, ptr %given, ptr %scratch, ptr %out, ptr null"
         stage.write_line(f"call void {function}(ptr {context}, {arguments})")
-        end_function(stage)
+        stage.end_function()
         adjoint = _AdjointWriter(design, tuple(link for link, _ in self.members), self.rows, wanted)
         adjoint.write_function()
         writers = (stage, adjoint.ir)
@@ -308,7 +307,7 @@ class GradientWriter:
             t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {8 * size}, i1 false)")
         t.close_loop("k", "designs", "design", "done")
         t.write_label("done")
-        end_function(t)
+        t.end_function()
 
 
 def run_designs(bound: BoundRun, designs: Array, weights: Array, count: int) -> tuple[Array, Array]:

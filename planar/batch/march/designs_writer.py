@@ -159,8 +159,7 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(count, t.double_pointer(counts, self.lane))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
-        t.write_line("ret void")
-        t.write_line("}")
+        t.end_function()
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
         return DesignsKernelLayout(self.request, self.state, self.equations.input_operands, rows, t.module_text())

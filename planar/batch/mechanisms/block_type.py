@@ -121,7 +121,7 @@ class BlockType:
         "how many blocks of its equations have two assembly modes"
         self._texts: dict[tuple[bool, bool] | None, BlockText] = {}
         has_forms = len(forms) == len(blocks) and self.sign_count <= MAX_SIGNS
-        self.has_closed_form = has_forms and self._can_be_written(blocks, (None, (False, False)))
+        self.has_closed_form = has_forms and self._can_be_written(blocks, (None,))
         "whether all unknowns are in closed form, by functions that can be compiled"
         size = slice(0, e.z.numel())
         together = KernelBlock(Block(size, size, self.inner_links, (), False, 0), None)

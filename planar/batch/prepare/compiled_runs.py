@@ -214,13 +214,7 @@ def end_run(t: IRWriter) -> None:
     """End the function."""
     t.write_line("br label %leave")
     t.write_label("leave")
-    end_function(t)
-
-
-def end_function(t: IRWriter) -> None:
-    """Return from a function and end it."""
-    t.write_line("ret void")
-    t.write_line("}")
+    t.end_function()
 
 
 def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
@@ -247,7 +241,7 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     for k, operand in enumerate(order):
         if operand in numbers:
             t.store(numbers[operand], t.double_pointer("%numbers", str(k)))
-    end_function(t)
+    t.end_function()
     t.write_line("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
     return t
 

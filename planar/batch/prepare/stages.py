@@ -55,7 +55,6 @@ from planar.batch.prepare.compiled_runs import (
     MakeNumbers,
     RunPositions,
     RunStages,
-    end_function,
     end_run,
     input_rows,
     load_constant,
@@ -175,7 +174,7 @@ class _StartWriter(BlockJoinWriter):
             else:
                 self._write_nearer(part, k, have)
         self._write_choice(have)
-        end_function(t)
+        t.end_function()
         return t
 
     def _write_nearer(self, part: KernelBlock, k: int, have: OperandNames) -> None:
@@ -312,7 +311,7 @@ class _PositionsWriter(KernelWriter):
         t.write_line(f"store double {ending}, ptr %out")
         number = t.add_instruction(f"sitofp i64 {position} to double")
         t.write_line(f"store double {number}, ptr {t.double_pointer('%out', '1')}")
-        end_function(t)
+        t.end_function()
         t.write_line(f"declare {bits} @llvm.cttz.{bits}({bits}, i1)")
 
     def _write_checks(self, angle_rows: range, tolerance: str) -> tuple[str, str, str]:

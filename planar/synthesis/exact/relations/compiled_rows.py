@@ -9,7 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from planar.codegen.formula_kernel import LANES, ComplexKernel
+from planar.codegen.complex_kernel import ComplexKernel
+from planar.codegen.formula_kernel import LANES
 from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.equations.generic_evaluation import inline_function
 from planar.foundation.arrays import Array, ComplexArray
