@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
-from planar.batch.initial_assembly import CORRECTIONS, find_assemblies
+from planar.batch.initial_assembly import CORRECTIONS, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_assemblies
 from planar.batch.march.designs_writer import (
     MARCH_ARGUMENTS,
     MARCH_FUNCTION,
