@@ -48,7 +48,7 @@ class DesignAssemblies(NamedTuple):
     """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
 
     `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
-    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
+    `signs` (blocks, designs): of the assemblies of blocks, None where not all have a closed form.
     """
 
     z: Array
@@ -57,10 +57,8 @@ class DesignAssemblies(NamedTuple):
     signs: Array | None = None
 
 
-MAX_ALONE = 12
-"""Designs that are not clear: up to this count they are solved one by one sooner than they are searched for."""
-MAX_OPTIONS = 64
-"""Combinations of assemblies of blocks that are joined for a design; one that has more to look at is searched for."""
+MAX_OPTIONS = 512
+"""Combinations of assemblies of blocks that are joined for a design; one that has more to look at is not sure."""
 CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
 
@@ -77,11 +75,9 @@ def find_assemblies(reference: ReferenceDesign, rows: DesignRows) -> DesignAssem
         if assemblies is None:
             return AssemblySearch(reference, rows).search()
         rest = np.flatnonzero(~assemblies.is_sure & (assemblies.failed_block < 0))
-        if rest.size > (0 if assemblies.signs is None else MAX_ALONE):
+        if rest.size and assemblies.signs is None:  # what closed forms leave open no search decides
             searched = AssemblySearch(reference, rows.select(rest)).search()
             assemblies.z[:, rest], assemblies.is_sure[rest], assemblies.failed_block[rest] = searched[:3]
-            if assemblies.signs is not None:
-                assemblies.signs[:, rest] = 0.0
         return assemblies
 
 

@@ -25,7 +25,7 @@ POSITIONS_AT_ONCE = 2**16
 
 
 class ClosedFormDesigns:
-    """Designs whose blocks are all in closed form, in assemblies that are known, one of whose inputs runs."""
+    """Designs of a batch whose blocks are all in closed form, in assemblies of known signs; input `index` runs."""
 
     def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array):
         self.joiner, self.batch, self.index, self.signs = joiner, batch, index, signs
@@ -59,19 +59,20 @@ class ClosedFormDesigns:
     def stop_positions(self, moved: Array) -> Array:
         """Where the pairs with stops are (stops, designs) when the input has moved so far (designs,)."""
         u = self.batch.u0 + moved * self.direction[:, None]
-        return DesignEvaluation(self.batch).pair_positions(self.find_unknowns(self.batch, self.signs, u), u)
+        return DesignEvaluation(self.batch).pair_positions(self.find_unknowns(self.batch, u), u)
 
     def lead(self, span: Array, step: float) -> tuple[Array, DeadPoints]:
         """Designs led on so far (designs,): the unknowns there (unknowns, designs), and what ends them before."""
         dead_points = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step))
         dead_points = dead_points._replace(distance=np.where(span == 0.0, np.inf, dead_points.distance))
         u = self.batch.u0 + span * self.direction[:, None]
-        return self.find_unknowns(self.batch, self.signs, u), dead_points
+        return self.find_unknowns(self.batch, u), dead_points
 
-    def find_unknowns(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
-        """z (unknowns, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
+    def find_unknowns(self, batch: DesignBatch, u: Array) -> Array:
+        """z (unknowns, designs) of a batch of some of the designs at inputs u (inputs, designs)."""
+        assert batch.signs is not None
         with np.errstate(all="ignore"):
-            state = self.joiner.follow(batch, signs, u)
+            state = self.joiner.follow(batch, batch.signs, u)
         return unknowns_from_state(self.joiner.state, state, len(batch.z0))
 
     def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
@@ -79,9 +80,8 @@ class ClosedFormDesigns:
         out, passed = np.empty((self.batch.output_row_count, len(design))), np.zeros(len(design), dtype=bool)
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
             batch = self.batch.select(design[part])
-            u, signs = batch.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
-            z = self.find_unknowns(batch, signs, u)
-            out[:, part], passed[part] = solve_positions(batch, u, z)
+            u = batch.u0 + moved[part] * self.direction[:, None]
+            out[:, part], passed[part] = solve_positions(batch, u, self.find_unknowns(batch, u))
         return out, passed
 
 
@@ -91,14 +91,7 @@ def closed_form_designs(batch: DesignBatch, index: int) -> ClosedFormDesigns | N
     if batch.signs is None or links_counting_turns(batch.mechanism):
         return None
     joiner = find_joiner(batch, None)
-    if joiner is None:
-        return None
-    signs = batch.signs.copy()
-    unknown = np.flatnonzero(~signs.all(axis=0))
-    if unknown.size:
-        rows = (values[:, unknown] for values in (batch.z0, batch.u0, batch.p))
-        signs[:, unknown] = joiner.equations.assembly_signs(*rows)
-    return ClosedFormDesigns(joiner, batch, index, signs)
+    return None if joiner is None else ClosedFormDesigns(joiner, batch, index, batch.signs)
 
 
 def find_ends(
