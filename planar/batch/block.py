@@ -184,8 +184,8 @@ class DesignBlockSolver:
             status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
-            int(number): (int(np.sum(code == number)), self._question(int(np.argmax(code == number)), inputs))
-            for number in np.unique(code[code != 0])
+            int(number): (int(count), self._question(int(early[first]), inputs))
+            for number, first, count in zip(*np.unique(code[early], return_index=True, return_counts=True), strict=True)
         }
         for index in rest:
             self._solve_alone(index, out, status, inputs)
