@@ -81,7 +81,12 @@ class ClosedFormDesigns:
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
             batch = self.batch.select(design[part])
             u = batch.u0 + moved[part] * self.direction[:, None]
-            out[:, part], passed[part] = solve_positions(batch, u, self.find_unknowns(batch, u))
+            # by their signs; the unknowns are computed for positions near where two assemblies meet
+            rows, good = solve_positions(batch, u, np.full_like(batch.z0, np.nan))
+            if not good.all():
+                near, u = batch.select(~good), u[:, ~good]
+                rows[:, ~good], good[~good] = solve_positions(near, u, self.find_unknowns(near, u))
+            out[:, part], passed[part] = rows, good
         return out, passed
 
 
