@@ -10,7 +10,7 @@ import numpy as np
 from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.design_stops import DesignStops
+from planar.batch.design_stops import STEPS_BEYOND_STOP, find_input_stops, watch_stops
 from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
@@ -135,19 +135,19 @@ class DesignBlockSolver:
         self.reference, self.design_count = block.reference(), block.design_count
         self.scale = float(self.reference.input_scale[self.reference.running_index])
         self.rows = self.reference.design_rows(block.designs, self.design_count)
-        self.u = self.rows.u
-        own_start = self.u[self.reference.running_index] * self.scale
-        self.start: Array = own_start if block.start is None else np.full(self.design_count, float(block.start))
+        self.start: Array = self.rows.u[self.reference.running_index] * self.scale
+        if block.start is not None:
+            self.start = np.full(self.design_count, float(block.start))
         self.has_own_range = self.reference.is_sliding and block.stop is None and block.duration is None
         "whether every design has a range of its own, from limit to limit"
         self.solved_steps = np.full(self.design_count, -1)
-        "how many steps are solved of a design that was followed to its end, or to a dead point"
+        "how many steps are solved of a design whose end is known"
+        self.ends = np.full((2, self.design_count), np.nan)
+        "where the running input is at the dead point that ends a design, and at the stop"
+        self.is_stopped = np.zeros(self.design_count, dtype=bool)
+        "which designs are ended by a stop, of those whose end is known"
         self.general_positions, self.followed_designs = 0, 0
         self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
-        self.dead_point, self.stop_position = np.full((2, self.design_count), np.nan)
-        self.stops: DesignStops | None = None
-        self.is_stopped = np.zeros(self.design_count, dtype=bool)
-        "which designs are ended by a stop, of those that were followed"
         self.limits = np.full((2, self.design_count), np.nan)
         "between which inputs run that have a range of their own, rad or sizes"
         self.failed_block = np.full(self.design_count, -1)
@@ -184,14 +184,14 @@ class DesignBlockSolver:
             status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
-            int(number): (int(np.sum(code == number)), self._question(int(np.argmax(code == number)), inputs))
-            for number in np.unique(code[code != 0])
+            int(number): (int(count), self._question(int(early[first]), inputs))
+            for number, first, count in zip(*np.unique(code[early], return_index=True, return_counts=True), strict=True)
         }
         for index in rest:
             self._solve_alone(index, out, status, inputs)
         counts = self.general_positions, len(rest) + self.followed_designs
         endings = tuple((number, *ending) for number, ending in self.endings.items())
-        return SolvedDesigns(out, status, inputs, *counts, endings, self.dead_point, self.stop_position)
+        return SolvedDesigns(out, status, inputs, *counts, endings, *self.ends)
 
     def _can_be_compiled(self) -> bool:
         """Whether designs may run compiled, as far as the mechanism and the range tell."""
@@ -230,8 +230,8 @@ class DesignBlockSolver:
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""
         solved = self._question(index, inputs).solve(self.block.points, self.block.rates)
-        out[:, :, index], status[index], self.dead_point[index] = solved.out, solved.status, solved.dead_point
-        self.stop_position[index] = solved.stop_position
+        out[:, :, index], status[index] = solved.out, solved.status
+        self.ends[:, index] = solved.dead_point, solved.stop_position
         if self.has_own_range:
             inputs[index] = solved.input
         self.general_positions += int(np.sum(solved.status == 0))
@@ -289,65 +289,58 @@ class DesignBlockSolver:
 
     def _run_over_range(self, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
         """out and good where one input runs over a range. Raises UnsupportedOperation."""
-        index = self.reference.running_index
-        fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
-        offsets = np.zeros((self.block.steps + 1, len(self.u)))
-        u0 = self.u.copy()
+        index, u, lengths = self.reference.running_index, self.rows.u, self.range_length
+        fit &= (np.abs(u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
+        offsets = np.zeros((self.block.steps + 1, len(u)))
+        u0 = u.copy()
         u0[index] = self.start / self.scale
-        offsets[:, index] = np.linspace(0.0, self.range_length[0] / self.scale, self.block.steps + 1)
+        offsets[:, index] = np.linspace(0.0, lengths[0] / self.scale, self.block.steps + 1)
         march = march._replace(u0=u0, input_offsets=offsets)
         if self.reference.mechanism.stops:
-            march = self._watch_stops(march, fit)
+            designs = with_design_values(self.reference.mechanism, self.block.designs)
+            limits, is_inside, is_outside = watch_stops(self.reference, designs, march, u)
+            outside = fit & is_outside
+            self.solved_steps[outside], self.is_stopped[outside] = 0, True
+            fit &= is_inside & ~outside
+            march = march._replace(stops=limits)
         if self.has_own_range or not self.has_common_length:
             return self._run_own_ranges(march, fit), np.zeros(self.design_count, dtype=int)
         march, fit = self._lead_to_start(march, fit)
-        fit = fit if self.stops is None else fit & self.stops.have_room(march, self.range_length)
-        out, good, candidates = self._run_fit_designs(march, fit)
-        self._end_at_input_stops(march, good, candidates)
-        self._follow_to_dead_points(march, out, good, candidates)
+        if march.stops is None:
+            out, good, candidates = self._run_fit_designs(march, fit, len(offsets))
+        else:
+            fit &= march.stops.have_room(march.u0[index], lengths)
+            distance, solved, is_clear = find_input_stops(march, index, lengths)
+            needed = int(solved[fit].max(initial=1)) + STEPS_BEYOND_STOP
+            out, good, candidates = self._run_fit_designs(march, fit, min(needed, len(offsets)))
+            stopped = np.flatnonzero((good > solved) & is_clear)
+            np.maximum(candidates, good, out=candidates)
+            np.minimum(good, solved, out=good)
+            self._end_designs(stopped, solved[stopped], distance[stopped], np.ones(stopped.size, dtype=bool))
+        self._find_ends(march, out, good, candidates)
         erase_between(out, np.where(self.solved_steps >= 0, self.solved_steps, good), candidates)
         return out, good
-
-    def _watch_stops(self, march: DesignBatch, fit: Array) -> DesignBatch:
-        """The march with the stops of its pairs; designs that start outside of them end there, others may be unfit."""
-        designs = with_design_values(self.reference.mechanism, self.block.designs)
-        self.stops = DesignStops(self.reference, designs, self.u)
-        self.stops.watch_start(march, self.u)
-        outside = fit & self.stops.is_outside
-        self.solved_steps[outside], self.is_stopped[outside] = 0, True
-        fit &= self.stops.is_fit & ~outside
-        return march._replace(stops=self.stops.limits)
-
-    def _end_at_input_stops(self, march: DesignBatch, good: Array, candidates: Array) -> None:
-        """End designs at a stop of the input that runs, beyond which they would have gone on."""
-        if self.stops is None:
-            return
-        distance, solved, is_clear = self.stops.find_input_stops(march, self.range_length)
-        stopped = np.flatnonzero((good > solved) & is_clear)
-        candidates[:] = np.maximum(candidates, good)
-        np.minimum(good, solved, out=good)
-        self.solved_steps[stopped] = solved[stopped]
-        self._keep_ends(stopped, distance[stopped], np.ones(stopped.size, dtype=bool))
 
     def _run_own_ranges(self, march: DesignBatch, fit: Array) -> Array:
         """Return out of designs whose ranges differ. Raises UnsupportedOperation where a block is not in closed
         form."""
-        fit = fit if self.stops is None or self.has_own_range else fit & self.stops.have_room(march, self.range_length)
+        index = self.reference.running_index
+        if march.stops is not None and not self.has_own_range:
+            fit = fit & march.stops.have_room(march.u0[index], self.range_length)
         chosen = np.flatnonzero(fit & (self.range_length != 0.0))
-        designs = closed_form_designs(march.select(chosen), self.reference.running_index)
+        designs = closed_form_designs(march.select(chosen), index)
         if designs is None:
             raise UnsupportedOperation("a block is not in closed form")
         out = self._own_output(march)
         out[:] = np.nan
-        if not self.has_own_range:
+        if self.has_own_range:
+            self.limits[:, chosen], rows = run_between_limits(designs, self.block.steps)
+            settled = np.isfinite(self.limits[0, chosen])
+            out[:, :, chosen[settled]] = rows[:, :, settled]
+            self.solved_steps[chosen[settled]] = len(out)
+        else:
             lengths, none = self.range_length[chosen] / self.scale, np.zeros(chosen.size, dtype=int)
             self._settle(chosen, find_ends(designs, lengths, none, none, self.block.steps), out)
-            return out
-        runs = run_between_limits(designs, self.block.steps)
-        self.limits[:, chosen] = runs.limits
-        settled = chosen[runs.is_settled]
-        out[:, :, settled] = runs.out[:, :, runs.is_settled]
-        self.solved_steps[settled] = len(out)
         return out
 
     def _own_output(self, march: DesignBatch) -> Array:
@@ -365,11 +358,10 @@ class DesignBlockSolver:
             self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
-    def _run_fit_designs(self, march: DesignBatch, fit: Array) -> tuple[Array, Array, Array]:
-        """out, good and candidates of all designs, of which only the fit ones are run."""
+    def _run_fit_designs(self, march: DesignBatch, fit: Array, steps: int) -> tuple[Array, Array, Array]:
+        """out, good and candidates of all designs, of which only the fit ones are run, so many steps."""
         out, candidates = self._own_output(march), np.zeros(self.design_count, dtype=int)
         self.march, march.u0[:, ~fit] = march, np.nan
-        steps = len(out) if self.stops is None else self.stops.needed_steps(march, self.range_length, fit)
         needed = march._replace(input_offsets=march.input_offsets[:steps])
         out[steps:] = np.nan
         if fit.mean() > RUN_ALL_RATIO:
@@ -390,67 +382,66 @@ class DesignBlockSolver:
         counts[0, chosen] = run_designs(march.select(chosen), rows, candidates)
         out[: len(rows), :, chosen], counts[1, chosen] = rows, candidates
 
-    def _follow_to_dead_points(self, march: DesignBatch, out: Array, good: Array, candidates: Array) -> None:
+    def _find_ends(self, march: DesignBatch, out: Array, good: Array, candidates: Array) -> None:
         """Follow the designs that compiled code did not bring to the end, all at once, to their ends.
 
         good and candidates: the numbers of steps of each design (designs,).
         """
-        open_ = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
-        if not open_.size:
+        remaining = np.flatnonzero((good > 0) & (good < len(march.input_offsets)) & (self.solved_steps < 0))
+        if not remaining.size:
             return
         index = self.reference.running_index
-        designs = closed_form_designs(march.select(open_), index)
+        designs = closed_form_designs(march.select(remaining), index)
         if designs is not None:
-            lengths = self.range_length[open_] / self.scale
-            ends = find_ends(designs, lengths, good[open_], np.maximum(good, candidates)[open_], self.block.steps)
-            self._settle(open_, ends, out)
-            open_ = open_[~ends.is_settled]
-        if open_.size:
-            followed = follow_to_dead_points(march.select(open_), index, good[open_])
-            self._settle(open_, followed, out)
+            lengths, first = self.range_length[remaining] / self.scale, np.maximum(good, candidates)[remaining]
+            ends = find_ends(designs, lengths, good[remaining], first, self.block.steps)
+            self._settle(remaining, ends, out)
+            remaining = remaining[~ends.is_settled]
+        if remaining.size:
+            followed = follow_to_dead_points(march.select(remaining), index, good[remaining])
+            self._settle(remaining, followed, out)
             self.general_positions += int(followed.design.size)
             self.followed_designs += int(followed.is_settled.sum())
 
     def _settle(self, designs: Array, followed: FollowedDesigns, out: Array) -> None:
         """Store the positions of followed designs and where they end."""
         out[followed.step, :, designs[followed.design]] = followed.out.T
-        is_settled = followed.is_settled
-        settled = designs[is_settled]
-        self.solved_steps[settled] = followed.solved_steps[is_settled]
-        self._keep_ends(settled, followed.distance[is_settled], followed.stop[is_settled] >= 0)
+        solved, distance, is_stopped = (
+            rows[followed.is_settled] for rows in (followed.solved_steps, followed.distance, followed.is_stopped)
+        )
+        self._end_designs(designs[followed.is_settled], solved, distance, is_stopped)
 
-    def _keep_ends(self, settled: Array, distance: Array, is_stopped: Array) -> None:
-        """Keep where designs end (designs,), rad or sizes from their start: at dead points, or at stops."""
-        position = self.start[settled] + np.sign(self.range_length[settled]) * distance * self.scale
-        ended = self.solved_steps[settled] <= self.block.steps
-        self.dead_point[settled] = np.where(ended & ~is_stopped, position, np.nan)
-        self.stop_position[settled] = np.where(ended & is_stopped, position, np.nan)
-        self.is_stopped[settled] = is_stopped
+    def _end_designs(self, designs: Array, solved: Array, distance: Array, is_stopped: Array) -> None:
+        """Store how many steps of designs are solved, and where they end, rad or sizes from their start: at dead
+        points, or at stops."""
+        position = self.start[designs] + np.sign(self.range_length[designs]) * distance * self.scale
+        self.ends[is_stopped.astype(int), designs] = np.where(solved <= self.block.steps, position, np.nan)
+        self.solved_steps[designs], self.is_stopped[designs] = solved, is_stopped
 
     def _lead_to_start(self, march: DesignBatch, fit: Array) -> tuple[DesignBatch, Array]:
         """Lead the assemblies at the designs' own inputs to where the march starts; return the march from there, and
         which designs arrived (designs,)."""
-        offset = march.u0 - self.u
+        offset = march.u0 - self.rows.u
         longest = float(np.max(np.abs(offset), initial=0.0))
         if longest == 0.0:
             return march, fit
         if longest > LARGEST_INPUT_POSITION:
             return march, np.zeros_like(fit)
         index, chosen = self.reference.running_index, np.flatnonzero(fit)
-        origin = march._replace(u0=self.u).select(chosen)
+        origin = march._replace(u0=self.rows.u).select(chosen)
         designs, arrived = closed_form_designs(origin, index), np.zeros_like(fit)
         span = offset[index, chosen]
         if designs is not None:
             z, ends = designs.lead(span, LEAD_IN_STEP)
             room = ends.distance - np.abs(span)
             dead = np.isfinite(ends.distance) & (-room > DEAD_POINT_MARGIN * np.abs(span))
-            self.solved_steps[chosen[dead]] = 0
-            self.is_stopped[chosen[dead]] = designs.stops_of(ends)[dead] >= 0
+            self.solved_steps[chosen[dead]], self.is_stopped[chosen[dead]] = 0, designs.is_stop(ends)[dead]
             arrived[chosen] = room > DEAD_POINT_MARGIN * np.abs(span)
         else:
             z, arrived[chosen] = lead_designs(origin, index, span, LEAD_IN_STEP)
-            if march.stops is not None:
-                arrived &= march.stops.input_rooms(self.u[index], offset[index]) >= np.abs(offset[index]) - SAME_END
+            if origin.stops is not None:
+                rooms = origin.stops.input_rooms(origin.u0[index], span)
+                arrived[chosen] &= rooms >= np.abs(span) - SAME_END
         march.z0[:, chosen] = z
         return march, arrived
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.runs import last_good_unknowns
+from planar.batch.march.runs import last_good_unknowns, run_designs
 from planar.batch.march.stops import nearest_end
+from planar.codegen.llvm_compile import allocate_aligned
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.continuation.predictor_corrector import (
@@ -32,6 +33,8 @@ MAX_ARCS = 120
 DEAD_POINT_MARGIN = 1e-8
 """Parts of the run: so near to a dead point a step is left to be judged by itself."""
 MAX_HALVINGS = 60
+ZERO_TOLERANCE = 1e-9
+"""rad, sizes or a rate by which a zero on an arc may be missed."""
 PLACES_ON_ARC = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Parts of an arc at which it is looked whether pairs keep off their stops."""
 PASSES, DEAD_POINT, STOP = range(3)
@@ -39,18 +42,55 @@ PASSES, DEAD_POINT, STOP = range(3)
 
 
 class FollowedDesigns(NamedTuple):
-    """Which designs are settled (designs,), how many of their steps are solved (designs,), how far from the start their
-    dead points are, rad or sizes, infinitely where there is none (designs,), and the steps that were solved points:
-    design, step (solved,) and the points there, out (rows, solved). It is a stop that ends a design where `stop`
-    (designs,) is not negative: that of this pair, and behind these that of the input."""
+    """How designs end that were followed past a march.
+
+    Which designs are settled, how many of their steps are solved, the distance of their ends from the start (rad or
+    sizes; infinite where there is none), and whether it is a stop that ends them, each (designs,). Then the steps that
+    were solved: design and step (solved,) and the points there, out (rows, solved).
+    """
 
     is_settled: Array
     solved_steps: Array
     distance: Array
+    is_stopped: Array
     design: Array
     step: Array
     out: Array
-    stop: Array
+
+
+StepSolver = Callable[[Array, Array], tuple[Array, Array]]
+"""Returns the points (rows, solved) of designs at steps (solved,), and which of them pass the checks."""
+
+
+def solve_until_ends(
+    distance: Array, is_stopped: Array, step: Array, step_count: int, first: Array, solve: StepSolver
+) -> FollowedDesigns:
+    """Solve the steps of designs from `first` (designs,) on that come before their ends.
+
+    `distance` is that of the ends, NaN where it is not known, and `step` the length of a step, rad or sizes (designs,).
+    A design whose end is so near to a step that it is not clear which comes first is not settled.
+    """
+    nearest = np.clip(np.rint(distance / step), 0, step_count) * step
+    settled = ~np.isnan(distance) & (np.abs(distance - nearest) > DEAD_POINT_MARGIN * step_count * step)
+    solved = np.where(settled, np.ceil(np.minimum(distance / step, step_count + 1.0)), 0.0).astype(int)
+    count = np.maximum(solved - first, 0)
+    design = np.repeat(np.arange(len(count)), count)
+    number = first[design] + np.arange(len(design)) - np.repeat(np.cumsum(count) - count, count)
+    out, passed = solve(design, number)
+    settled[design[~passed]] = False
+    solved[~settled] = 0
+    if not passed.all():
+        design, number, out = (rows[..., settled[design]] for rows in (design, number, out))
+    return FollowedDesigns(settled, solved, distance, is_stopped, design, number, out)
+
+
+def solve_positions(batch: DesignBatch, u: Array, z: Array) -> tuple[Array, Array]:
+    """The points (rows, designs) of a batch at inputs u (inputs, designs) before any end, by unknowns z (unknowns,
+    designs) near by or by the batch's signs, and which of them pass the checks."""
+    # they lie before their ends
+    batch = batch if batch.stops is None else batch._replace(stops=batch.stops.cleared())
+    out = allocate_aligned(1, batch.output_row_count, u.shape[1])
+    return out[0], run_designs(batch._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u)))), out) > 0
 
 
 class _CurvePoints(NamedTuple):
@@ -151,47 +191,52 @@ def follow_to_dead_points(batch: DesignBatch, index: int, good_steps: Array) -> 
 
 class _DeadPointTracker:
     def __init__(self, batch: DesignBatch, index: int, good_steps: Array):
-        self.batch, self.good_steps = batch, good_steps
-        self.steps = len(batch.input_offsets) - 1
+        self.batch, self.good_steps, self.design_count = batch, good_steps, len(good_steps)
         length = float(batch.input_offsets[-1, index])
         self.direction = np.where(np.arange(len(batch.u0)) == index, np.sign(length), 0.0)
-        self.distances = np.abs(batch.input_offsets[:, index])
-        self.design_count = len(good_steps)
-        none = np.zeros((0, len(batch.z0) + 1))
-        self.arcs = [_CurveArcs(np.zeros(0, dtype=int), none, none, none, none, np.zeros(0, dtype=int))]
+        self.length, self.step_count = abs(length), len(batch.input_offsets) - 1
         self.is_settled = np.zeros(self.design_count, dtype=bool)
-        self.dead_point_distance = np.full(self.design_count, np.inf)
-        "the place of the dead point, or of the stop"
+        self.distance = np.full(self.design_count, np.inf)
+        "of the dead point, or of the stop, from the start"
         self.stop = np.full(self.design_count, -1)
         self.input_rooms = np.full(self.design_count, np.inf)
         if batch.stops is not None:
             self.input_rooms = batch.stops.input_rooms(batch.u0[index], np.full(self.design_count, length))
-        self.limits = np.minimum(self.distances[-1], self.input_rooms)
-        "where the input is at the end of its range, or at its stop"
         self.turns = np.zeros((len(batch.stop_pairs), self.design_count))
         "rad to add to the positions of pairs with stops, so that they lie between these"
 
     def follow(self, z: Array) -> FollowedDesigns:
         """See `follow_to_dead_points`; z (designs, unknowns) at the last good steps."""
-        self._track(z)
-        arcs = _CurveArcs(*(np.concatenate(parts) for parts in zip(*self.arcs, strict=True)))
-        for end in (DEAD_POINT, STOP):
-            self._end_arcs(arcs, end)
+        arcs = _CurveArcs(*(np.concatenate(parts) for parts in zip(*self._track(z), strict=True)))
+        self._end_arcs(arcs)
         # designs whose input meets a stop of its own before anything else end there
-        last = self.distances[-1]
-        ends = nearest_end(self.dead_point_distance, self.stop, self.input_rooms, last, len(self.turns))
-        self.dead_point_distance, self.stop = ends
-        near = self._is_near_step(self.input_rooms) & (self.stop == len(self.turns))
-        self.is_settled &= ~np.isnan(self.dead_point_distance) & ~near
-        return self._solve_steps(arcs)
+        rows = self.distance, self.stop, self.input_rooms
+        distance, stop = nearest_end(*rows, self.length, len(self.turns))
+        distance[~self.is_settled] = np.nan
+        # the arcs in the order of designs, and of each as the input goes on
+        arcs = arcs.select(np.lexsort((arcs.y0[:, -1], arcs.design)))
+        step = np.full(self.design_count, self.length / self.step_count)
 
-    def _is_near_step(self, distances: Array) -> Array:
-        """Whether distances of the input (designs,) are as good as those of a step."""
-        return np.abs(self.distances[:, None] - distances).min(axis=0) < DEAD_POINT_MARGIN * self.distances[-1]
+        def solve(design: Array, number: Array) -> tuple[Array, Array]:
+            if not len(design):
+                return np.empty((self.batch.output_row_count, 0)), np.zeros(0, dtype=bool)
+            place, width = number * step[design], 2.0 * self.length
+            arc = np.searchsorted(arcs.design * width + arcs.y0[:, -1], design * width + place, side="right") - 1
+            part = arcs.select(np.maximum(arc, 0))
+            y, fine = self._find_falling_zero(part, lambda y: place - y[:, -1])
+            batch = self.batch.select(design)
+            out, passed = solve_positions(batch, batch.u0 + place * self.direction[:, None], y[:, :-1].T)
+            return out, passed & fine & (part.design == design)
 
-    def _track(self, z: Array) -> None:
+        return solve_until_ends(distance, stop >= 0, step, self.step_count, self.good_steps, solve)
+
+    def _track(self, z: Array) -> list[_CurveArcs]:
+        """The arcs of the designs from their last good steps to where something ends them."""
+        none = np.zeros((0, z.shape[1] + 1))
+        sound_arcs = [_CurveArcs(np.zeros(0, dtype=int), none, none, none, none, np.zeros(0, dtype=int))]
         active = np.flatnonzero(np.all(np.isfinite(z), axis=1))
-        y = np.hstack([z[active], self.distances[self.good_steps[active] - 1][:, None]])
+        start = (self.good_steps[active] - 1) * (self.length / self.step_count)
+        y = np.hstack([z[active], start[:, None]])
         curves = _DesignCurves(self.batch, active, self.direction)
         if self.turns.size and self.batch.stops is not None:
             positions = curves.evaluation.pair_positions(y[:, :-1].T, curves.inputs(y).T)
@@ -205,7 +250,7 @@ class _DeadPointTracker:
             if not going.all():
                 points, step, active = points.select(going), step[going], active[going]
                 if not active.size:
-                    return
+                    break
                 curves = _DesignCurves(self.batch, active, self.direction)
             bend = np.linalg.norm(points.curvature, axis=1)
             step = first_step(np.minimum(step, LONGEST_STEP), points.regular_distance, bend)
@@ -228,12 +273,13 @@ class _DeadPointTracker:
                 fine &= clear | meets
                 end[meets] = STOP
             # a design is settled at its dead point, where it meets a stop, or at its last step
-            is_last = (end != PASSES) | (after.y[:, -1] >= self.limits[active])
-            self.is_settled[active[fine & is_last]] = True
-            self.arcs.append(arcs.select(fine))
+            limits = np.minimum(self.length, self.input_rooms[active])
+            self.is_settled[active[fine & ((end != PASSES) | (after.y[:, -1] >= limits))]] = True
+            sound_arcs.append(arcs.select(fine))
             step = np.where(fine, STEP_GROWTH * step, 0.5 * step)
             parts = zip(after, points, strict=True)
             points = _CurvePoints(*(np.where(fine.reshape(-1, *[1] * (new.ndim - 1)), new, old) for new, old in parts))
+        return sound_arcs
 
     def _rooms(self, design: Array, y: Array) -> Array:
         """How far pairs are from their stops (stops, designs) at points of designs, negative beyond."""
@@ -268,60 +314,24 @@ class _DeadPointTracker:
             a, fa, b, fb = np.where(up, x, a), np.where(up, f, fa), np.where(up, b, x), np.where(up, fb, f)
             if np.all((np.abs(f) < 1e-10) | (b - a < 1e-13) | ~fine):
                 break
-        return y, fine & (np.abs(value(y)) < 1e-7)
+        return y, fine & (np.abs(value(y)) < ZERO_TOLERANCE)
 
-    def _end_arcs(self, arcs: _CurveArcs, end: int) -> None:
-        """End the arcs that end their design so, and the designs, at the dead point or stop."""
-        ended = np.flatnonzero(arcs.end == end)
+    def _end_arcs(self, arcs: _CurveArcs) -> None:
+        """End the last arcs of designs, and the designs, at their dead points and stops."""
+        ended = np.flatnonzero(arcs.end != PASSES)
         if not ended.size:
             return
         part = arcs.select(ended)
-        design, curves = part.design, _DesignCurves(self.batch, part.design, self.direction)
-        if end == STOP:
-            y, fine = self._find_falling_zero(part, lambda y: self._rooms(design, y).min(axis=0))
-            self.stop[design] = np.argmin(self._rooms(design, y), axis=0)
-        else:
-            y, fine = self._find_falling_zero(part, lambda y: curves.tangents(curves.jacobians(y), part.t0)[:, -1])
-        self.dead_point_distance[design] = y[:, -1]
-        self.is_settled[design[~fine | self._is_near_step(y[:, -1])]] = False
-        arcs.y1[ended], arcs.t1[ended] = y, curves.tangents(curves.jacobians(y), part.y1 - part.y0)
+        design, is_stop = part.design, part.end == STOP
+        curves = _DesignCurves(self.batch, design, self.direction)
 
-    def _solve_steps(self, arcs: _CurveArcs) -> FollowedDesigns:
-        """The designs with the points at their steps on arcs."""
-        solved = np.where(
-            self.is_settled,
-            np.searchsorted(self.distances, np.minimum(self.dead_point_distance, 2 * self.distances[-1])),
-            0,
-        )
-        first, last = (np.searchsorted(self.distances, y[:, -1], side="right") for y in (arcs.y0, arcs.y1))
-        first = np.maximum(first, self.good_steps[arcs.design])
-        last = np.minimum(last, np.minimum(solved, self.steps + 1)[arcs.design])
-        count = np.where(self.is_settled[arcs.design], np.maximum(last - first, 0), 0)
-        arc = np.repeat(np.arange(len(count)), count)
-        step = first[arc] + np.arange(len(arc)) - np.repeat(np.cumsum(count) - count, count)
-        out, fine = self._points_at_steps(arcs.select(arc), step)
-        design = arcs.design[arc]
+        def value(y: Array) -> Array:
+            rate = curves.tangents(curves.jacobians(y), part.t0)[:, -1]
+            return np.where(is_stop, self._rooms(design, y).min(axis=0), rate) if is_stop.any() else rate
+
+        y, fine = self._find_falling_zero(part, value)
+        self.distance[design] = y[:, -1]
         self.is_settled[design[~fine]] = False
-        # every step of a design once, no more and no less
-        step_counts = np.bincount(design, minlength=self.design_count)
-        self.is_settled &= step_counts == np.maximum(solved - self.good_steps, 0)
-        kept = self.is_settled[design]
-        return FollowedDesigns(
-            self.is_settled, solved, self.dead_point_distance, design[kept], step[kept], out[:, kept], self.stop
-        )
-
-    def _points_at_steps(self, arcs: _CurveArcs, step: Array) -> tuple[Array, Array]:
-        """The points (rows, steps) where arcs come to steps, and which of them pass the checks."""
-        out = np.empty((self.batch.output_row_count, len(step)))
-        if not len(step):
-            return out, np.zeros(0, dtype=bool)
-        place = self.distances[step]
-        y, fine = self._find_falling_zero(arcs, lambda y: place - y[:, -1])
-        batch = self.batch.select(arcs.design, y[:, :-1].T)
-        evaluation = DesignEvaluation(batch)
-        u = batch.u0 + place * self.direction[:, None]
-        z = evaluation.correct(y[:, :-1], u.T)
-        fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
-        positions = evaluation.positions(z, u)
-        fine &= evaluation.accepts(positions) & evaluation.write_points(out, positions)
-        return out, fine
+        if is_stop.any():
+            self.stop[design] = np.where(is_stop, np.argmin(self._rooms(design, y), axis=0), -1)
+        arcs.y1[ended], arcs.t1[ended] = y, curves.tangents(curves.jacobians(y), part.y1 - part.y0)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from planar.batch.closed_form.dead_points import DeadPoints, search_dead_points
 from planar.batch.closed_form.joined_blocks import BlockJoiner, find_joiner
-from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
+from planar.batch.dead_point_tracking import FollowedDesigns, solve_positions, solve_until_ends
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import unknowns_from_state
-from planar.batch.march.runs import run_designs
 from planar.batch.march.stops import nearest_end
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.model.mechanism import links_counting_turns
@@ -28,7 +25,7 @@ POSITIONS_AT_ONCE = 2**16
 
 
 class ClosedFormDesigns:
-    """Designs whose blocks are all in closed form, in assemblies that are known, one of whose inputs runs."""
+    """Designs of a batch whose blocks are all in closed form, in assemblies of known signs; input `index` runs."""
 
     def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array):
         self.joiner, self.batch, self.index, self.signs = joiner, batch, index, signs
@@ -38,7 +35,7 @@ class ClosedFormDesigns:
         """The first dead points of designs that surely came so far, whose input is to go so far to either side, in
         steps of so much (designs,)."""
         batch, stops, sense = self.batch, self.batch.stops, np.sign(lengths)
-        if stops is not None and stops.has_wide_ranges:
+        if stops is not None and stops.wide_ranges.any():
             batch = batch._replace(stops=stops.near_positions(self.stop_positions(sense * reached)))
         # links that carry other blocks may turn faster than the input
         longest = SEARCH_STEP if self.joiner.equations.carrying_angles else LONGEST_STEP
@@ -46,43 +43,36 @@ class ClosedFormDesigns:
         dead_points = search_dead_points(self.joiner.equations, self.index, batch, self.signs, ranges)
         if stops is None:
             return dead_points
-        dead_points = self._where_stops_are(dead_points, sense)
+        distance, stop = dead_points.distance, dead_points.block - len(self.signs)
+        stopped = np.flatnonzero(np.isfinite(distance) & (stop >= 0))
+        if stopped.size:  # the functions that tell where stops are may reach one elsewhere too
+            positions = self.stop_positions(np.where(np.isfinite(distance), sense * distance, 0.0))[:, stopped]
+            distance[stopped[~stops.select(stopped).is_at_stop(positions, stop[stopped])]] = np.nan
         rooms = stops.input_rooms(self.direction @ batch.u0, lengths)
         input_end = len(self.signs) + len(batch.stop_pairs)
         return DeadPoints(*nearest_end(*dead_points, rooms, np.abs(lengths), input_end))
 
-    def stops_of(self, dead_points: DeadPoints) -> Array:
-        """Which stop ends designs (designs,), -1 where none does."""
-        return np.where(dead_points.block >= len(self.signs), dead_points.block - len(self.signs), -1)
+    def is_stop(self, dead_points: DeadPoints) -> Array:
+        """Whether a stop ends designs (designs,)."""
+        return np.asarray(dead_points.block >= len(self.signs))
 
     def stop_positions(self, moved: Array) -> Array:
         """Where the pairs with stops are (stops, designs) when the input has moved so far (designs,)."""
         u = self.batch.u0 + moved * self.direction[:, None]
-        return DesignEvaluation(self.batch).pair_positions(self.find_unknowns(self.batch, self.signs, u), u)
-
-    def _where_stops_are(self, dead_points: DeadPoints, sense: Array) -> DeadPoints:
-        """The same, but nothing where a stop is none: what tells where stops are is nothing elsewhere too."""
-        end, stops = self.stops_of(dead_points), self.batch.stops
-        stopped = np.flatnonzero(np.isfinite(dead_points.distance) & (end >= 0))
-        if stopped.size and stops is not None:
-            moved = np.zeros(len(sense))
-            moved[stopped] = sense[stopped] * dead_points.distance[stopped]
-            positions = self.stop_positions(moved)[:, stopped]
-            is_at_stop = stops.select(stopped).is_at_stop(positions, end[stopped])
-            dead_points.distance[stopped[~is_at_stop]] = np.nan
-        return dead_points
+        return DesignEvaluation(self.batch).pair_positions(self.find_unknowns(self.batch, u), u)
 
     def lead(self, span: Array, step: float) -> tuple[Array, DeadPoints]:
         """Designs led on so far (designs,): the unknowns there (unknowns, designs), and what ends them before."""
         dead_points = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step))
         dead_points = dead_points._replace(distance=np.where(span == 0.0, np.inf, dead_points.distance))
         u = self.batch.u0 + span * self.direction[:, None]
-        return self.find_unknowns(self.batch, self.signs, u), dead_points
+        return self.find_unknowns(self.batch, u), dead_points
 
-    def find_unknowns(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
-        """z (unknowns, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
+    def find_unknowns(self, batch: DesignBatch, u: Array) -> Array:
+        """z (unknowns, designs) of a batch of some of the designs at inputs u (inputs, designs)."""
+        assert batch.signs is not None
         with np.errstate(all="ignore"):
-            state = self.joiner.follow(batch, signs, u)
+            state = self.joiner.follow(batch, batch.signs, u)
         return unknowns_from_state(self.joiner.state, state, len(batch.z0))
 
     def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
@@ -90,12 +80,13 @@ class ClosedFormDesigns:
         out, passed = np.empty((self.batch.output_row_count, len(design))), np.zeros(len(design), dtype=bool)
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
             batch = self.batch.select(design[part])
-            # they lie before their ends
-            batch = batch if batch.stops is None else batch._replace(stops=batch.stops.cleared())
-            u, signs = batch.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
-            z, row = self.find_unknowns(batch, signs, u), allocate_aligned(1, len(out), len(moved[part]))
-            passed[part] = run_designs(batch._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u)))), row) > 0
-            out[:, part] = row[0]
+            u = batch.u0 + moved[part] * self.direction[:, None]
+            # by their signs; the unknowns are computed for positions near where two assemblies meet
+            rows, good = solve_positions(batch, u, np.full_like(batch.z0, np.nan))
+            if not good.all():
+                near, u = batch.select(~good), u[:, ~good]
+                rows[:, ~good], good[~good] = solve_positions(near, u, self.find_unknowns(near, u))
+            out[:, part], passed[part] = rows, good
         return out, passed
 
 
@@ -105,14 +96,7 @@ def closed_form_designs(batch: DesignBatch, index: int) -> ClosedFormDesigns | N
     if batch.signs is None or links_counting_turns(batch.mechanism):
         return None
     joiner = find_joiner(batch, None)
-    if joiner is None:
-        return None
-    signs = batch.signs.copy()
-    unknown = np.flatnonzero(~signs.all(axis=0))
-    if unknown.size:
-        rows = (values[:, unknown] for values in (batch.z0, batch.u0, batch.p))
-        signs[:, unknown] = joiner.equations.assembly_signs(*rows)
-    return ClosedFormDesigns(joiner, batch, index, signs)
+    return None if joiner is None else ClosedFormDesigns(joiner, batch, index, batch.signs)
 
 
 def find_ends(
@@ -125,17 +109,12 @@ def find_ends(
     """
     step = np.abs(lengths) / steps
     dead_points = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step)
-    distance = dead_points.distance
-    nearest = np.clip(np.rint(distance / step), 0, steps) * step
-    settled = ~np.isnan(distance) & (np.abs(distance - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
-    solved = np.where(settled, np.ceil(np.minimum(distance / step, steps + 1.0)), 0.0).astype(int)
-    count = np.maximum(solved - candidates, 0)
-    design = np.repeat(np.arange(len(good)), count)
-    number = candidates[design] + np.arange(len(design)) - np.repeat(np.cumsum(count) - count, count)
-    out, passed = designs.solve_positions(design, np.sign(lengths)[design] * number * step[design])
-    settled[design[~passed]] = False
-    kept, solved, stop = settled[design], np.where(settled, solved, 0), designs.stops_of(dead_points)
-    return FollowedDesigns(settled, solved, distance, design[kept], number[kept], out[:, kept], stop)
+
+    def solve(design: Array, number: Array) -> tuple[Array, Array]:
+        return designs.solve_positions(design, np.sign(lengths)[design] * number * step[design])
+
+    is_stopped = designs.is_stop(dead_points)
+    return solve_until_ends(dead_points.distance, is_stopped, step, steps, candidates, solve)
 
 
 SEARCH_STEP = 0.03
@@ -146,17 +125,12 @@ DISTANCE_FROM_LIMIT = 1e-8
 """Parts of the range: so near to a limit the middle of the two assemblies that meet there is as near to it."""
 
 
-class LimitedRuns(NamedTuple):
-    """Which designs are settled (designs,), the limits of their inputs (2, designs), rad or sizes, and the points out
-    (steps + 1, rows, designs), with no rates at dead points."""
+def run_between_limits(designs: ClosedFormDesigns, steps: int) -> tuple[Array, Array]:
+    """Run designs from the dead point or stop below to that above, in so many steps.
 
-    is_settled: Array
-    limits: Array
-    out: Array
-
-
-def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
-    """Run designs from the dead point or stop below to that above, in so many steps."""
+    Returns the limits of their inputs (2, designs), rad or sizes, NaN where they are not settled, and the points out
+    (steps + 1, rows, designs), with no rates at dead points.
+    """
     batch, count = designs.batch, designs.batch.p.shape[1]
     span, none = np.full(count, SHOWN_SLIDE_EXTENT), np.zeros(count)
     down, up = (designs.find_dead_points(none, sense * span, np.full(count, SEARCH_STEP)) for sense in (-1.0, 1.0))
@@ -170,7 +144,7 @@ def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
         out[step][:, limited], passed = designs.solve_positions(limited, moved)
         settled[limited[~passed]] = False
     for step, sense, ends in ((0, -1.0, down), (steps, 1.0, up)):
-        moved, is_stop = sense * ends.distance, ends.block[limited] >= len(designs.signs)
+        moved, is_stop = sense * ends.distance, designs.is_stop(ends)[limited]
         dead, stopped = limited[~is_stop], limited[is_stop]
         rows, passed = _points_at_limit(designs, dead, moved[dead], ends.block[dead], length[dead])
         out[step][: len(rows), dead] = rows
@@ -180,7 +154,7 @@ def run_between_limits(designs: ClosedFormDesigns, steps: int) -> LimitedRuns:
             settled[stopped[~passed]] = False
     start = designs.direction @ batch.u0
     limits = np.stack([start - down.distance, start + up.distance])
-    return LimitedRuns(settled, np.where(settled, limits, np.nan), out)
+    return np.where(settled, limits, np.nan), out
 
 
 def _points_at_limit(

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import BoolArray
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
 
@@ -59,26 +60,24 @@ class StopLimits(NamedTuple):
 
         Of an angle that does not count turns, from the middle of the range to the opposite of it.
         """
-        low, high = (self._offsets(positions, sense) for sense in (1.0, -1.0))
-        return np.where(self._periodic_rows, _nearer_room(low, high), np.minimum(low, high))
-
-    def _offsets(self, positions: Array, sense: float) -> Array:
-        return positions - self.low if sense > 0.0 else self.high - positions
+        low, high = positions - self.low, self.high - positions
+        with np.errstate(invalid="ignore"):  # of open ends, which no periodic angle has
+            from_middle = np.remainder(0.5 * (low - high) + np.pi, TURN) - np.pi
+        return np.where(self._periodic_rows, 0.5 * (low + high) - np.abs(from_middle), np.minimum(low, high))
 
     @property
     def _periodic_rows(self) -> Array:
         return np.array(self.is_periodic, dtype=bool)[:, None]
 
     @property
-    def has_wide_ranges(self) -> bool:
-        """Whether an angle has a range of about a turn."""
-        wide = self._periodic_rows & (self.high - self.low > WIDE_RANGE)
-        return bool(wide.any())
+    def wide_ranges(self) -> BoolArray:
+        """Which stops are of an angle with a range of about a turn (stops, designs)."""
+        return np.asarray(self._periodic_rows & (self.high - self.low > WIDE_RANGE))
 
     def near_positions(self, positions: Array) -> StopLimits:
         """The same with functions for designs whose positions (stops, designs) are inside: where an angle has a wide
         range they have one sign on either side of the nearer stop, as far as a quarter of a turn from it."""
-        wide = self._periodic_rows & (self.high - self.low > WIDE_RANGE)
+        wide = self.wide_ranges
         low, high = np.mod(positions - self.low, TURN), np.mod(self.high - positions, TURN)
         numbers = self.numbers.copy()
         for stop, sense, is_nearer in ((self.low, 1.0, low <= high), (self.high, -1.0, high < low)):
@@ -99,21 +98,18 @@ class StopLimits(NamedTuple):
         """How far the input that runs may go on from where it is (designs,), as it is to go so far to either side."""
         return np.asarray(np.where(lengths >= 0.0, self.input_high - inputs, inputs - self.input_low))
 
+    def have_room(self, inputs: Array, lengths: Array) -> BoolArray:
+        """Whether the input that runs may begin to go from where it is to the side of these lengths (designs,)."""
+        behind = self.input_rooms(inputs, -lengths)
+        return np.asarray((self.input_rooms(inputs, lengths) > SURE_DISTANCE) & (behind >= -SAME_END))
+
     def is_at_stop(self, positions: Array, stop: Array) -> Array:
         """Whether positions (stops, designs) are where a stop of each design (designs,) is, to rounding of a search."""
         columns = np.arange(positions.shape[1])
-        low, high = (self._offsets(positions, sense)[stop, columns] for sense in (1.0, -1.0))
-        periodic = np.array(self.is_periodic, dtype=bool)[stop]
-        offsets = np.stack([low, high])
+        offsets = np.stack([positions - self.low, self.high - positions])[:, stop, columns]
+        periodic = self._periodic_rows[stop, 0]
         offsets = np.where(periodic, np.remainder(offsets + np.pi, TURN) - np.pi, offsets)
         return np.asarray(np.abs(offsets).min(axis=0) < SURE_DISTANCE)
-
-
-def _nearer_room(low: Array, high: Array) -> Array:
-    """The room of an angle to the nearer of two stops, from which it is so far, modulo turns."""
-    middle, half = 0.5 * (low - high), 0.5 * (low + high)
-    with np.errstate(invalid="ignore"):  # of open ends, which no angle has here
-        return np.asarray(half - np.abs(np.remainder(middle + np.pi, TURN) - np.pi))
 
 
 def stop_limits(

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly.assembly_scores import is_at_sketch, is_surely_farther
 from planar.batch.march.prediction import CLEAR_REGULARITY
 from planar.batch.mechanisms.block_type import (
     COS,
@@ -26,6 +25,7 @@ from planar.codegen.tape import LANES, Tape, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
+from planar.solving.assembly.nearest_assembly import is_at_sketch, is_surely_farther
 
 LEAST_CLEARANCE = 1e-4
 """Minimum distance measure from a dead point of an assembly that is taken."""

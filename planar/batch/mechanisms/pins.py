@@ -11,7 +11,6 @@ from weakref import WeakKeyDictionary
 import casadi as ca
 import numpy as np
 
-from planar.batch.assembly.assembly_scores import is_surely_farther
 from planar.batch.march.prediction import LEAST_COSINE
 from planar.batch.mechanisms.block_type import write_formula
 from planar.batch.mechanisms.results import PointTable, pin_number
@@ -29,6 +28,7 @@ from planar.batch.mechanisms.tape_runs import (
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.model.pin_linkages import PinnedLinkages
+from planar.solving.assembly.nearest_assembly import is_surely_farther
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
 
 

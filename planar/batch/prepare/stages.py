@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from planar.batch.assembly.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.closed_form.joined_blocks import BlockJoinWriter
-from planar.batch.initial_assembly import CORRECTIONS, find_assemblies
+from planar.batch.initial_assembly import CORRECTIONS, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_assemblies
 from planar.batch.march.designs_writer import (
     MARCH_ARGUMENTS,
     MARCH_FUNCTION,

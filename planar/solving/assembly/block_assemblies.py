@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +63,7 @@ class BlockAssembly(NamedTuple):
 
     z: Array
     distance: float
-    slides_behind: int
+    slides_behind: float
     height: float
     slides_ahead: float
 
@@ -222,28 +222,39 @@ class BlockAssemblies:
     def _assembly_of(self, stage: Block, z: Array, root: Array) -> BlockAssembly:
         unknowns = z.copy()
         unknowns[stage.unknowns] = root
-        sketched = {name: self.first_link[name] for name in self.sketched_by_level.get(stage.block_index, ())}
+        w = self.functions.coordinates_ahead(stage.block_index + 1, unknowns, self.u, self.p)
+        position = self.block_position(stage, w.data, self.local, self.numbers)  # floats, few of many
+        return BlockAssembly(unknowns, *(float(part) for part in position))
+
+    def block_position(
+        self,
+        stage: Block,
+        w: Sequence[Scalar] | Mapping[int, Scalar] | Array,
+        local: Mapping[str, Mapping[str, Vector]],
+        numbers: Mapping[str, Sequence[Scalar]],
+    ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+        """How a block lies, in the order of `BlockAssembly`, at coordinates w in any arithmetic.
+
+        `local` is the positions of points in their links, `numbers` those of pairs, in the same arithmetic.
+        """
+        names = self.sketched_by_level.get(stage.block_index, ())
+        sketched = {name: self.first_link[name][1:] for name in names}
         pairs = {name: self.pairs[name] for name in stage.pairs}
         links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
-        links |= {link for _, link, _ in sketched.values()}
-        w = self.functions.coordinates_ahead(stage.block_index + 1, unknowns, self.u, self.p)
-        frames, own = frames_from_coordinates(w.data, self.column, links, pairs)  # floats, few of many
-        gaps = [
-            frames[link].to_world(self.local[link][point]) - self.sketch[name]
-            for name, (_, link, point) in sketched.items()
-        ]
-        drives = [
-            (pair, float(pair.input_position([frames[link] for link in pair.bodies], self.numbers[name], own[name])))
+        links |= {link for link, _ in sketched.values()}
+        frames, pair_coordinates = frames_from_coordinates(w, self.column, links, pairs)
+        gaps = [frames[link].to_world(local[link][at]) - self.sketch[name] for name, (link, at) in sketched.items()]
+        slides = [
+            (pair, pair.input_position([frames[link] for link in pair.bodies], numbers[name], pair_coordinates[name]))
             for name, pair in pairs.items()
             if pair.coordinate_kinds
         ]
-        heights = [frames[link].to_world(at).y for link in stage.links for at in self.local[link].values()]
-        return BlockAssembly(
-            unknowns,
-            sum(float(gap.dot(gap)) for gap in gaps),
-            sum(not pair.is_intended_assembly(drive) for pair, drive in drives),
+        heights = [frames[link].to_world(point).y for link in stage.links for point in local[link].values()]
+        return (
+            sum(gap.dot(gap) for gap in gaps),
+            sum(1.0 - pair.is_intended_assembly(position) for pair, position in slides),
             sum(heights) / len(heights) if heights else 0.0,
-            sum(drive for _, drive in drives),
+            sum(position for _, position in slides),
         )
 
     def from_all_starts(self, stage: Block, z: Array) -> list[BlockAssembly]:

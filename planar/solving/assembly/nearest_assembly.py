@@ -10,8 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.symbolic_equations import Block
-from planar.foundation.arrays import Array
-from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
+from planar.foundation.arrays import Array, BoolArray
+from planar.solving.assembly.block_assemblies import (
+    CLEAR_SKETCH_DISTANCE,
+    BlockAssemblies,
+    BlockAssembly,
+    block_dependencies,
+)
 
 EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
@@ -22,6 +27,21 @@ MAX_BEST_FIRST_EFFORT = 3000.0
 the search looks for a nearer assembly; beyond it takes the best partial one to an end."""
 MAX_REPEATED_EFFORT = 1.2 * MAX_BEST_FIRST_EFFORT
 """The same effort at which the search stops without an assembly: combinations of earlier blocks grow exponentially."""
+
+
+def is_at_sketch(
+    squared_distance: Array, point_count: int | Array, reach: float | Array = CLEAR_SKETCH_DISTANCE
+) -> BoolArray:
+    """Whether points lie where the sketch shows them, by the sum of their squared distances (squared sizes)."""
+    return np.asarray(squared_distance <= point_count * reach**2)
+
+
+def is_surely_farther(other: Array, total: Array, roundings: int = 1) -> BoolArray:
+    """Whether another assembly of a block, taken alone, lies farther from the sketch than the total that was taken.
+
+    Squared distances never fall as blocks are added, so there is then no nearer assembly.
+    """
+    return np.asarray(other > total + roundings * EQUAL_DISTANCE_TOLERANCE)
 
 
 class Assembly(NamedTuple):
@@ -86,7 +106,7 @@ class _Node(NamedTuple):
     """A partial assembly, in the order in which the search takes them up."""
 
     cost: float
-    slides_behind: int
+    slides_behind: float
     ranks: tuple[int, ...]
     number: int
     z: Array
