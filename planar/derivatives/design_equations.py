@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property, lru_cache
 
 import casadi as ca
@@ -19,6 +19,7 @@ from planar.equations.residuals import input_positions, pair_residuals, scalars
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
+from planar.model.link_shapes import PointMember
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind, Pair
 from planar.results.kinematic_result import KinematicResult
@@ -50,13 +51,14 @@ class DesignEquations:
         self.t = ca.vertcat(self.u, self.u1, self.u2, self.d)
         self.z = self.equations.z
         self.z1, self.z2 = (ca.SX.sym(name, self.z.numel()) for name in ("z1", "z2"))
-        numbers = [
+        self.pair_numbers: list[Scalar] = [
             number
             for pair in mechanism.pairs
             for number in scale_lengths(self.work.numbers[pair.name], pair.number_kinds, self.solver.unit)
         ]
+        "p, lengths in sizes"
         scaled_inputs = self.u / ca.DM(self.input_scale)
-        self.F, w = self.equations.as_function()(self.z, scaled_inputs, stack_expressions(numbers))
+        self.F, w = self.equations.as_function()(self.z, scaled_inputs, stack_expressions(self.pair_numbers))
         self.w = w * ca.DM(self.solver.scale)
 
     @cached_property
@@ -70,6 +72,11 @@ class DesignEquations:
         y, y1 = ca.vertcat(self.z, self.u), ca.vertcat(self.z1, self.u1)
         first, second = time_derivatives(value, y, y1, ca.vertcat(self.z2, self.u2))
         return first, second
+
+    def point_numbers(self, members: Iterable[PointMember]) -> list[Scalar]:
+        """q: x and y of points of links in the axes of these, in sizes."""
+        shapes, unit = self.work.shapes, self.solver.unit
+        return [part / unit for link, point in members for part in shapes[link].position(point)]
 
     @cached_property
     def placed(self) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
@@ -116,6 +123,11 @@ class DesignEquations:
 def design_equations(mechanism: Mechanism, offsets: tuple[str, ...] = ()) -> DesignEquations:
     """The equations of a mechanism, kept for the next time."""
     return DesignEquations(mechanism, offsets)
+
+
+def with_rates(value: ca.SX, y: Sequence[ca.SX]) -> list[ca.SX]:
+    """An expression in y, and its rates, as many as y has."""
+    return [value, *time_derivatives(value, *y)] if len(y) > 1 else [value]
 
 
 class SymbolicMotion(RatedMotion):
