@@ -17,11 +17,12 @@ from planar.derivatives.kinematic_slopes import (
     Directions,
     KinematicSlopes,
     NamedResult,
+    Parameters,
     constraint_elements,
+    design_dimensions,
     kinematic_results,
     stack_results,
 )
-from planar.derivatives.parameters import Parameters, design_dimensions
 from planar.document.dimensions import Dimension, value_at
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces

@@ -49,7 +49,7 @@ from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.derivatives.design_equations import design_equations, with_rates
-from planar.derivatives.parameters import INPUT_RATES
+from planar.derivatives.kinematic_slopes import INPUT_RATES
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import block_jacobian
 from planar.equations.symbolic_equations import ConstraintEquations, slice_length

@@ -14,8 +14,13 @@ from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
 from planar.batch.prepare.compiled_runs import CompiledRuns, address_of, prepare_runs
 from planar.batch.prepare.run_code import ALL_SOLVED, STATUS_OF_ENDING, UNSURE, padded_width
 from planar.batch.reference_design import ReferenceDesign
-from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
-from planar.derivatives.parameters import Parameters
+from planar.derivatives.kinematic_slopes import (
+    CoordinateMotion,
+    KinematicSlopes,
+    Parameters,
+    constraint_elements,
+    result_array,
+)
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
 from planar.foundation.arrays import Array, IntArray

@@ -31,10 +31,10 @@ from planar.derivatives.kinematic_slopes import (
     CoordinateMotion,
     Directions,
     KinematicSlopes,
+    Parameters,
     constraint_elements,
     result_array,
 )
-from planar.derivatives.parameters import Parameters
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
 from planar.equations.casadi_call import BufferedFunction
