@@ -10,19 +10,28 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.enclosures import ImplicitSystem, ParametricSystem
-from planar.derivatives.kinematic_slopes import GROUND_RATES, INPUT_RATES, Parameters, RatedMotion, kinematic_results
+from planar.derivatives.force_slopes import BalanceAtPositions, ForceBalance
+from planar.derivatives.kinematic_slopes import (
+    INPUT_RATES,
+    CoordinateMotion,
+    FileNumbers,
+    Parameters,
+    constraint_elements,
+    kinematic_results,
+)
+from planar.dynamics.external_actions import effort_actions
 from planar.dynamics.forces import Forces
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.coordinates import FRAME_PARTS
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import scale_lengths
 from planar.equations.rates import time_derivatives
-from planar.equations.residuals import input_positions, pair_residuals, scalars
+from planar.equations.residuals import scalars
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.generalised_inverses import invert_matrices
-from planar.foundation.geometry import Frame, Vector
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import PointMember
 from planar.model.mechanism import Mechanism
@@ -44,14 +53,10 @@ class DesignEquations:
         self.solver: PositionSolver = solved_mechanism(mechanism).solver
         self.mechanism, self.equations = mechanism, self.solver.equations
         self.dimensions, self.names = self.parameters.dimensions, self.parameters.names
-        file_count = len(self.parameters.file_dimensions)
         self.d = ca.SX.sym("d", len(self.dimensions))
-        symbols = scalars(self.d)
-        self.work = LagrangianFunctions(self.parameters.mechanism_with(symbols[:file_count]), self.solver.unit)
-        pairs = {pair.name: pair for pair in mechanism.pairs}
-        for k, name in enumerate(offsets):
-            offset = Vector(*symbols[file_count + 2 * k : file_count + 2 * k + 2])
-            self.work.numbers[name] = pairs[name].offset_pin(self.work.numbers[name], offset)
+        pairs = [pair.name for pair in mechanism.pairs]
+        self.numbers = FileNumbers(self.parameters, pairs, scalars(self.d), lambda p: stack_expressions(p).T)
+        self.work = LagrangianFunctions(self.numbers.mechanism, self.solver.unit)
         count = len(mechanism.inputs)
         self.u, self.u1, self.u2 = (ca.SX.sym(name, count) for name in ("u", "u1", "u2"))
         self.t = ca.vertcat(self.u, self.u1, self.u2, self.d)
@@ -60,7 +65,7 @@ class DesignEquations:
         self.pair_numbers: list[Scalar] = [
             number
             for pair in mechanism.pairs
-            for number in scale_lengths(self.work.numbers[pair.name], pair.number_kinds, self.solver.unit)
+            for number in scale_lengths(self.numbers.measured[pair.name], pair.number_kinds, self.solver.unit)
         ]
         "p, lengths in sizes"
         scaled_inputs = self.u / ca.DM(self.input_scale)
@@ -85,15 +90,22 @@ class DesignEquations:
         return [part / unit for link, point in members for part in shapes[link].position(point)]
 
     @cached_property
-    def placed(self) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-        """The links' frames and the pairs' own coordinates, in symbols."""
-        solver = self.solver
-        return frames_from_coordinates(scalars(self.w), solver.column, list(solver.shapes), solver.pairs)
+    def positions(self) -> CoordinateMotion:
+        """The positions of the links, in symbols."""
+        return self._motion(self._q)
 
     @cached_property
-    def motion(self) -> SymbolicMotion:
+    def motion(self) -> CoordinateMotion:
         """The positions of the links with their rates, in symbols."""
-        return SymbolicMotion(self)
+        return self._motion(self._q, *self.rates(self._q))
+
+    def _motion(self, *q: ca.SX) -> CoordinateMotion:
+        return CoordinateMotion(self.work, self.numbers, self.solver.unit, Jet(*(part.T for part in q)))
+
+    @property
+    def _q(self) -> ca.SX:
+        """The coordinates q of `LagrangianFunctions`, in the unknowns."""
+        return self.w[self._columns]
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -101,10 +113,6 @@ class DesignEquations:
         column = self.solver.column
         columns = [column[link, part] for link in self.work.links for part in FRAME_PARTS]
         return columns + [column[pair.name, part] for pair in self.mechanism.pairs for part, _ in pair.coordinate_kinds]
-
-    def in_unknowns(self, value: ca.SX) -> ca.SX:
-        """An expression in the coordinates q of `LagrangianFunctions`, in the unknowns."""
-        return ca.substitute(value, self.work.q, self.w[self._columns])
 
     def coordinates_at(self, moving: KinematicResult) -> tuple[list[Array], Array]:
         """z, z', z'' (n, unknowns) and t (n, parameters) at a state or a motion."""
@@ -136,37 +144,6 @@ def with_rates(value: ca.SX, y: Sequence[ca.SX]) -> list[ca.SX]:
     return [value, *time_derivatives(value, *y)] if len(y) > 1 else [value]
 
 
-class SymbolicMotion(RatedMotion):
-    """Positions of links with two rates, as expressions in the unknowns, the inputs, their rates and the numbers."""
-
-    orders = 3
-
-    def __init__(self, design: DesignEquations):
-        self.design, self.mechanism, self.shapes = design, design.work.mechanism, design.work.shapes
-        self._rates: dict[str, Sequence[Sequence[Scalar]]] = {}
-
-    @property
-    def size(self) -> float:
-        return self.design.solver.unit
-
-    def frame(self, link: str) -> Frame:
-        return self.design.placed[0][link]
-
-    def frame_rates(self, link: str) -> Sequence[Sequence[Scalar]]:
-        if link == self.mechanism.frame:
-            return GROUND_RATES
-        if link not in self._rates:
-            parts = stack_expressions(self.frame(link)[:5])
-            self._rates[link] = [scalars(rate) for rate in (parts, *self.design.rates(parts))]
-        return self._rates[link]
-
-    def input_position(self, pair: Pair) -> Jet:
-        """The position of a relative motion with its rates."""
-        (position,) = input_positions([pair], self.frames, self.design.work.numbers, self.design.placed[1])
-        position = ca.SX(position)
-        return Jet(position, *self.design.rates(position))
-
-
 class OutputBalance:
     """The balance of weightless links under an effort of one at the pair of an output, `acting` = 0 in z, u and d.
 
@@ -175,34 +152,14 @@ class OutputBalance:
     """
 
     def __init__(self, design: DesignEquations, output: Pair):
-        self.design = design
-        work, pairs = design.work, design.work.mechanism.pairs
-        residuals: dict[str, list[ca.SX]] = {pair.name: [] for pair in pairs}
-        for row, residual in pair_residuals(pairs, work.frames, work.numbers, work.own):
-            residuals[row.pair].append(residual)
-        actions, multipliers = {}, []
-        for pair in pairs:
-            own_multipliers = ca.SX.sym("l", len(residuals[pair.name]))
-            multipliers.append(own_multipliers)
-            contact = pair.tooth_contact(work.frames, work.shapes, pairs)
-            if contact is None:
-                action = ca.jtimes(ca.vertcat(*residuals[pair.name]), work.q, own_multipliers, True)
-            else:
-                senses = dict(zip(pair.links, (-1.0, 1.0), strict=True))
-                unit = work.unit_action_on_links(senses, contact.pitch_point, contact.drive_direction)
-                action = own_multipliers[0] * unit
-            actions[pair.name] = design.in_unknowns(action)
-        efforts = ca.SX.sym("e", len(design.mechanism.inputs))
-        acting = work.unit_effort_on_links(output.name)
-        for k, driven in enumerate(design.mechanism.inputs):
-            acting += efforts[k] * work.unit_effort_on_links(driven.pair)
-        self.unknowns, self._actions = stack_expressions([*multipliers, efforts]), actions
-        self.acting = sum(actions.values(), design.in_unknowns(acting))
+        elements, motion = constraint_elements(design.mechanism), design.positions
+        self.unknowns = ca.SX.sym("l", elements.row_count)
+        self._balance = BalanceAtPositions(ForceBalance(elements, motion), motion, self.unknowns.T)
+        self.acting = stack_expressions(self._balance.open_rows(effort_actions(motion, "load", output.name, 1.0)))
 
     def force_on(self, name: str, link: str) -> Vector:
         """The force of a pair on one of its moving links."""
-        first, action = self.design.work.link_columns[link], self._actions[name]
-        return Vector(action[first], action[first + 1])
+        return self._balance.pair_wrench(name, link)[0]
 
 
 MAX_NEWTON_STEPS = 20
@@ -303,7 +260,7 @@ class LimitSystem:
 
 def _first_result(design: DesignEquations, state: State, output: str) -> ca.SX:
     """What is told first of a pair, else the angle of a link."""
-    results = kinematic_results(design.motion, state._point_members, output)
+    results = kinematic_results(design.positions, state._point_members, output)
     motions = design.work.relative_motions
     key = next(iter(motions[output].result_kinds)) if output in motions else "angle"
     value: ca.SX = next(named.parts[0] for named in reversed(results) if named.name == key)

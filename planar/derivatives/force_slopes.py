@@ -17,11 +17,13 @@ from functools import cached_property
 import numpy as np
 
 from planar.derivatives.kinematic_slopes import (
+    ConstraintElements,
     CoordinateMotion,
     KinematicSlopes,
     NamedResult,
     element_arguments,
     slopes_of_order,
+    stack_results,
     take_entries,
     variable_jet,
 )
@@ -57,12 +59,37 @@ ROUNDING = 1e-12
 """Of the greatest change with the factors of loads: a lesser one is none."""
 
 
+class ForceBalance:
+    """The balance of all links in their forces y, and what does not change with small changes: in which sense teeth
+    press (n, toothed pairs) and each pair rubs (n,), and one for the greatest part of each contact's loads, zero for
+    the others (n, parts)."""
+
+    def __init__(self, elements: ConstraintElements, motion: CoordinateMotion, count: int = 1):
+        """`motion` are the `count` positions."""
+        self.elements = elements
+        pairs = motion.mechanism.pairs
+        self.inputs = tuple(driven.pair for driven in motion.mechanism.inputs)
+        self.toothed = [
+            pair.name for pair in pairs if pair.tooth_contact(motion.frames, motion.shapes, pairs) is not None
+        ]
+        placed = {name: element for name, element in elements.placed_pairs.items() if name not in self.toothed}
+        by_rows = {element.rows.start: name for name, element in placed.items()}
+        self.groups = [
+            (group, [by_rows[int(row)] for row in group.rows[:, 0]]) for group in group_elements(placed.values())
+        ]
+        self.first_friction = elements.row_count
+        self.rubs = False
+        self.pressing: Array = np.zeros((count, len(self.toothed)))
+        self.senses: dict[str, Array] = {}
+        self.leading: dict[int, Array] = {}
+
+
 class BalanceAtPositions:
     """The balance at positions of any arithmetic, from coordinates, numbers of the file and forces y."""
 
-    def __init__(self, of: ForceSlopes, motion: CoordinateMotion, y: Scalar, factors: Sequence[Scalar], order: int = 1):
+    def __init__(self, of: ForceBalance, motion: CoordinateMotion, y: Scalar, order: int = 1):
         """`order` is that of the jets, 1 without any."""
-        self.of, self.motion, self.y, self.factors, self.order = of, motion, y, factors, order
+        self.of, self.motion, self.y, self.order = of, motion, y, order
         self.pairs = {pair.name: pair for pair in motion.mechanism.pairs}
         self._exerted: dict[str, list[Scalar]] = {}
         "by pair, what its constraints do on its local coordinates"
@@ -170,33 +197,25 @@ class BalanceAtPositions:
 
     # the equations
 
-    def open_balance(self, orders: Sequence[int], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
-        """By how much the balance is open (n, coordinates and contacts, ...): values, for an order of 0, or the
-        derivatives of an order, in these shapes."""
-        totals: list[Array] = [np.zeros(shape) for shape in shapes]
-
-        def add(column: int, value: Scalar) -> None:
-            for total, order in zip(totals, orders, strict=True):
-                total[:, column] += slopes_of_order(value, order)
-
+    def open_rows(self, actions: Iterable[LinkAction]) -> list[Scalar]:
+        """By how much the balance is open under some actions on the links: of every coordinate, then of contacts."""
         elements = self.of.elements
+        rows: list[Scalar] = [0.0] * elements.coordinate_count
         for name, exerted in self._exerted.items():  # a link may be two bodies of a pair
             for column, value in zip(elements.placed_pairs[name].coordinates, exerted, strict=True):
-                add(column, value)
-        turns = [self._constant(column) for column in self.of.spring_turns.T]
-        actions = [*passive_actions(self.motion, self.factors, turns), *self._friction_actions()]
-        actions += inertia_actions(self.motion) if self.of.with_inertia else ()
+                rows[column] = rows[column] + value
+        actions = [*actions, *self._friction_actions()]
         for index, name in enumerate(self.of.inputs):
             actions += effort_actions(self.motion, "input", name, self.effort(index))
         for name in self.contacts:
             actions += self._tooth_actions(name, True)
         for action in actions:
             if action.link in elements.link_columns:
-                for k, part in enumerate(action_on_link(self.motion, action)):
-                    add(elements.link_columns[action.link] + k, part)
-        for index in range(len(self.rubbing_contacts)):
-            add(elements.coordinate_count + index, self._friction_size(index) - self._required_size(index))
-        return totals
+                first = elements.link_columns[action.link]
+                for column, part in enumerate(action_on_link(self.motion, action), first):
+                    rows[column] = rows[column] + part
+        contacts = range(len(self.rubbing_contacts))
+        return [*rows, *(self._friction_size(index) - self._required_size(index) for index in contacts)]
 
     def _required_size(self, index: int) -> Scalar:
         """How great the friction of a contact is by what its pair's constraints exert."""
@@ -262,7 +281,7 @@ class BalanceAtPositions:
         return self.motion.place(end[0], self.motion.shapes[end[0]].position(end[1])) if end else None
 
 
-class ForceSlopes:
+class ForceSlopes(ForceBalance):
     """The derivatives of forces at positions (n), in the parameters and then in the factors of the loads."""
 
     def __init__(
@@ -270,31 +289,14 @@ class ForceSlopes:
     ):
         """`rows` are the positions among those of the forces, of which friction and inertia are taken, `factors`
         (n, loads) those of the loads there."""
-        self.kinematics, self.elements = kinematics, kinematics.elements
-        parameters = kinematics.parameters
-        self.inputs, self.rubs = parameters.inputs, forces is not None and bool(forces.friction)
-        self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
-        self.factors = factors
+        self.kinematics, count = kinematics, len(factors)
         self._balances: dict[int, BalanceAtPositions] = {}
-        constants = [rates[..., None] for rates in kinematics.rates]
-        self.motion = CoordinateMotion(self.elements, kinematics.numbers(0), parameters.unit, Jet(*constants))
-        count = len(factors)
-        pairs = parameters.mechanism.pairs
-        self.toothed = [
-            pair.name for pair in pairs if pair.tooth_contact(self.motion.frames, self.motion.shapes, pairs) is not None
-        ]
-        placed = {name: element for name, element in self.elements.placed_pairs.items() if name not in self.toothed}
-        by_rows = {element.rows.start: name for name, element in placed.items()}
-        self.groups = [
-            (group, [by_rows[int(row)] for row in group.rows[:, 0]]) for group in group_elements(placed.values())
-        ]
-        self.first_friction = self.elements.row_count
-        # what does not change with small changes: full turns of springs, in which sense teeth press and pairs rub, and
-        # one for the greatest part of each contact's loads, zero for the others
-        self.spring_turns = spring_turns
-        self.pressing: Array = np.zeros((count, len(self.toothed)))
-        self.senses: dict[str, Array] = {}
-        self.leading: dict[int, Array] = {}
+        unit, constants = kinematics.parameters.unit, [rates[..., None] for rates in kinematics.rates]
+        self.motion = CoordinateMotion(kinematics.elements, kinematics.numbers(0), unit, Jet(*constants))
+        super().__init__(kinematics.elements, self.motion, count)
+        self.rubs = forces is not None and bool(forces.friction)
+        self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
+        self.factors, self.spring_turns = factors, spring_turns
         contacts = self._at(np.zeros((count, self.first_friction, 1))).rubbing_contacts
         self.unknown_count = self.first_friction + len(contacts)
         self.is_unknown: BoolArray = np.zeros(count, bool)
@@ -314,17 +316,21 @@ class ForceSlopes:
 
     def _at(self, y: Scalar) -> BalanceAtPositions:
         """The balance at forces y, numbers (n, unknowns, 1) or jets along some changes of these."""
-        return BalanceAtPositions(self, self.motion, y, list(self.factors.T[..., None]))
+        return BalanceAtPositions(self, self.motion, y)
+
+    def _open(self, balance: BalanceAtPositions, factors: Sequence[Scalar]) -> list[Scalar]:
+        """By how much a balance is open under loads with these factors, weights, springs and inertia."""
+        turns = [column.reshape(-1, *((1,) * balance.order)) for column in self.spring_turns.T]
+        actions = [*passive_actions(balance.motion, factors, turns)]
+        with np.errstate(all="ignore"):  # what is not defined is not a number
+            return balance.open_rows([*actions, *(inertia_actions(balance.motion) if self.with_inertia else ())])
 
     def _linearise(self, y: Array) -> tuple[Array, Array]:
         """By how much the balance is open (n, rows, 1), and its Jacobian (n, rows, unknowns) in the forces."""
         count = self.unknown_count
         unit: Array = np.broadcast_to(np.eye(count), (len(y), count, count))
-        rows = self.elements.coordinate_count + count - self.first_friction
-        with np.errstate(all="ignore"):  # what is not defined is not a number
-            balance = self._at(variable_jet(y, unit))
-            opening, slopes = balance.open_balance([0, 1], [(len(y), rows, 1), (len(y), rows, count)])
-        return opening, slopes
+        rows = self._open(self._at(variable_jet(y, unit)), list(self.factors.T[..., None]))
+        return stack_results(rows, 0, (len(y),))[..., None], stack_results(rows, 1, (len(y), count))
 
     def _solve_with_friction(
         self, forces: Forces, rows_of_all: slice, contacts: Sequence[tuple[Pair, RubbingContact]]
@@ -384,12 +390,11 @@ class ForceSlopes:
 
         def balance_with(derivatives: Array) -> BalanceAtPositions:
             """The balance with these derivatives of the highest order (n, unknowns, parameters, ...)."""
-            y = variable_jet(self.y, *lower, derivatives)
-            return BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
+            return BalanceAtPositions(self, motion, variable_jet(self.y, *lower, derivatives), order)
 
         none: Array = np.zeros((len(self.y), self.unknown_count, *shape))
-        with np.errstate(all="ignore"):  # what is not defined is not a number
-            (opening,) = balance_with(none).open_balance([order], [(len(self.y), self._jacobian.shape[1], *shape)])
+        rows = self._open(balance_with(none), self._factor_jets(order))
+        opening = stack_results(rows, order, (len(self.y), *shape))
         columns = opening.reshape(*opening.shape[:2], self.kinematics.count**order)
         return balance_with(_close_balance(self._jacobian, self._inverse, columns).reshape(none.shape))
 

@@ -12,8 +12,7 @@ order is a jet of such jets, with two axes. Time derivatives are jets around the
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -226,57 +225,37 @@ class Directions:
 
 
 class FileNumbers:
-    """The numbers of a mechanism as jets of an order in all parameters: its `mechanism`, `shapes`, `measured` numbers
-    of pairs by name, and `p`, those of all constraints one after the other; of order 0 as they are."""
+    """A mechanism with numbers of any arithmetic in place of those of its file: its `mechanism`, `shapes`, `measured`
+    numbers of pairs by name, and `p`, those of all constraints one after the other."""
 
     def __init__(
         self,
         parameters: Parameters,
-        elements: ConstraintElements,
-        directions: Directions,
-        order: int,
-        values: Sequence[Any] | None = None,
+        pairs: Iterable[str],
+        numbers: Sequence[Scalar],
+        stack: Callable[[Sequence[Scalar]], Scalar],
     ):
-        """`values` are those of the dimensions, by default of the file: numbers, or arrays (n,) for n positions."""
-        first = 3 * len(parameters.inputs)
-
-        def number(index: int) -> Scalar:
-            value = parameters.dimensions[index].value if values is None else values[index]
-            if np.ndim(value):
-                value = np.reshape(value, (-1, *((1,) * max(order, 1))))
-            return directions.jet(first + index, value, order)
-
+        """`numbers` are those of the dimensions; `stack` makes p (1 or n, numbers, ...) of the numbers of `pairs`."""
         file_count = len(parameters.file_dimensions)
-        self.mechanism = parameters.mechanism_with([number(k) for k in range(file_count)])
+        self.mechanism = parameters.mechanism_with(numbers[:file_count])
         self.shapes = shapes_of_links(self.mechanism)
         self.relative_motions = relative_motions(self.mechanism)
-        pairs = {pair.name: pair for pair in self.mechanism.pairs} | dict(self.relative_motions)
+        known = {pair.name: pair for pair in self.mechanism.pairs} | dict(self.relative_motions)
         self.measured = {
-            name: list(pair.measure([self.shapes[link] for link in pair.bodies])) for name, pair in pairs.items()
+            name: list(pair.measure([self.shapes[link] for link in pair.bodies])) for name, pair in known.items()
         }
         for k, name in enumerate(parameters.offsets):
-            offset = Vector(number(file_count + 2 * k), number(file_count + 2 * k + 1))
-            self.measured[name] = list(pairs[name].offset_pin(self.measured[name], offset))
-        of_pairs = [value for name in elements.numbered_pairs for value in self.measured[name]]
-        self.p = stack_numbers(of_pairs, directions.count, order)
+            offset = Vector(*numbers[file_count + 2 * k : file_count + 2 * k + 2])
+            self.measured[name] = list(known[name].offset_pin(self.measured[name], offset))
+        self.p = stack([value for name in pairs for value in self.measured[name]])
 
 
-class RatedMotion(LinkMotion):
-    """Positions of links and of relative motions with rates, in any arithmetic."""
+class CoordinateMotion(LinkMotion):
+    """Positions of links and of relative motions from the coordinates q of links, jets in time of arrays (n,
+    coordinates, ...) or of symbols (1, coordinates)."""
 
-    orders: int
-    "how many rates are known, the position among them"
-
-    @abstractmethod
-    def input_position(self, pair: Pair) -> Jet:
-        """The position of a relative motion with its rates."""
-
-
-class CoordinateMotion(RatedMotion):
-    """Positions of links from their coordinates q, jets in time of arrays (n, coordinates, ...)."""
-
-    def __init__(self, elements: ConstraintElements, numbers: FileNumbers, size: float, q: Jet):
-        self.elements, self.numbers, self._size, self.q = elements, numbers, size, q
+    def __init__(self, columns: LinkCoordinates, numbers: FileNumbers, size: float, q: Jet):
+        self.columns, self.numbers, self._size, self.q = columns, numbers, size, q
         self.mechanism, self.shapes, self.orders = numbers.mechanism, numbers.shapes, len(q.parts)
         self._frames: dict[str, Frame] = {}
 
@@ -287,24 +266,25 @@ class CoordinateMotion(RatedMotion):
     def moving_frame(self, link: str) -> Frame:
         """A link's axes as jets in time."""
         if link not in self._frames:
-            first = self.elements.link_columns[link]
+            first = self.columns.link_columns[link]
             self._frames[link] = frame_at(*(take_entries(self.q, first + k) for k in range(3)))
         return self._frames[link]
 
     def frame_rates(self, link: str) -> Sequence[Sequence[Scalar]]:
-        if link not in self.elements.link_columns:
+        if link not in self.columns.link_columns:
             return GROUND_RATES
         parts = [part.parts for part in self.moving_frame(link)[:5]]
         return [[part[rate] for part in parts] for rate in range(len(parts[0]))]
 
     def own_coordinates(self, name: str) -> tuple[Jet, ...]:
         """The coordinates of a pair's own as jets in time."""
-        columns = self.elements.own_slices.get(name, slice(0, 0))
+        columns = self.columns.own_slices.get(name, slice(0, 0))
         return tuple(take_entries(self.q, k) for k in range(columns.start, columns.stop))
 
     def input_position(self, pair: Pair) -> Jet:
+        """The position of a relative motion with its rates."""
         frames = [
-            self.moving_frame(link) if link in self.elements.link_columns else self.frame(link) for link in pair.bodies
+            self.moving_frame(link) if link in self.columns.link_columns else self.frame(link) for link in pair.bodies
         ]
         numbers = [constant_jet(number, self.orders) for number in self.numbers.measured[pair.name]]
         position = pair.input_position(frames, numbers, self.own_coordinates(pair.name))
@@ -314,8 +294,8 @@ class CoordinateMotion(RatedMotion):
 class KinematicSlopes:
     """The derivatives of all coordinates and their rates at positions (n), in the parameters.
 
-    `rates` are the coordinates (n, coordinates), alone or with their first and second rates; `values` as of
-    `FileNumbers`.
+    `rates` are the coordinates (n, coordinates), alone or with their first and second rates; `values` are those of the
+    dimensions, by default of the file: numbers, or arrays (n,) for n positions.
     """
 
     def __init__(
@@ -345,8 +325,15 @@ class KinematicSlopes:
         self.first_slopes = self._solve(1, self.first_numbers)
 
     def numbers(self, order: int) -> FileNumbers:
-        """The numbers of the file of an order."""
-        return FileNumbers(self.parameters, self.elements, self.directions, order, self._values)
+        """The numbers of the file as jets of an order; of order 0 as they are."""
+        first = 3 * len(self.parameters.inputs)
+        dimensions = self.parameters.dimensions
+        numbers = []
+        for index, value in enumerate([d.value for d in dimensions] if self._values is None else self._values):
+            shaped = np.reshape(value, (-1, *((1,) * max(order, 1)))) if np.ndim(value) else value
+            numbers.append(self.directions.jet(first + index, shaped, order))
+        pairs = self.elements.numbered_pairs
+        return FileNumbers(self.parameters, pairs, numbers, lambda values: stack_numbers(values, self.count, order))
 
     def _scaled_jacobian(self, p: Array) -> SparseMatrices:
         """dF/dq (n, rows, coordinates), lengths in sizes of the mechanism."""
@@ -446,7 +433,7 @@ POINT_RESULTS = {"position": "length", "velocity": "velocity", "acceleration": "
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
-def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
+def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
     """The results of a state of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
 
     Without rates only what follows from positions.
