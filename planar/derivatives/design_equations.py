@@ -86,7 +86,7 @@ class DesignEquations:
 
     def point_numbers(self, members: Iterable[PointMember]) -> list[Scalar]:
         """q: x and y of points of links in the axes of these, in sizes."""
-        shapes, unit = self.work.shapes, self.solver.unit
+        shapes, unit = self.numbers.shapes, self.solver.unit
         return [part / unit for link, point in members for part in shapes[link].position(point)]
 
     @cached_property
