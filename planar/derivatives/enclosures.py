@@ -141,9 +141,11 @@ def _float_cosine(angle: Array, quarters: int) -> Array:
     for one, other in zip(COSINE_TERMS[-2::-1], SINE_TERMS[-2::-1], strict=True):
         even, odd = even * square + one, odd * square + other
     odd = odd * rest
-    place = np.mod(turns + quarters, 4.0)
-    found: Array = np.where(place == 0.0, even, np.where(place == 1.0, -odd, np.where(place == 2.0, -even, odd)))
-    return found
+    quadrant = np.mod(turns + quarters, 4.0)
+    cosine: Array = np.where(
+        quadrant == 0.0, even, np.where(quadrant == 1.0, -odd, np.where(quadrant == 2.0, -even, odd))
+    )
+    return cosine
 
 
 def _turned_cosine(angle: Intervals, quarters: int) -> Intervals:
@@ -159,12 +161,12 @@ def _turned_cosine(angle: Intervals, quarters: int) -> Intervals:
     return Intervals(np.where(known, lower, np.nan), np.where(known, upper, np.nan))
 
 
-def _may_hold(angle: Intervals, on: float) -> BoolArray:
-    """Whether a whole turn lies within, as far as floats tell it, once so many turns are added."""
-    low, high = (end / (2.0 * np.pi) + on for end in (angle.lower, angle.upper))
+def _may_hold(angle: Intervals, offset: float) -> BoolArray:
+    """Whether a multiple of a full turn may lie within an angle after some turns are added to it."""
+    low, high = (bound / (2.0 * np.pi) + offset for bound in (angle.lower, angle.upper))
     margin = 1e-14 * (1.0 + np.maximum(np.abs(low), np.abs(high)))
-    found: BoolArray = np.floor(high + margin) >= np.ceil(low - margin)
-    return found
+    may_hold: BoolArray = np.floor(high + margin) >= np.ceil(low - margin)
+    return may_hold
 
 
 def _point_angle(y: Array, x: Array) -> Intervals:
