@@ -12,18 +12,18 @@ that is, and in which sense each pair rubs, is known of a solution, and stays so
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from planar.derivatives.kinematic_slopes import (
+    ConstraintElements,
     CoordinateMotion,
     KinematicSlopes,
     NamedResult,
     element_arguments,
     slopes_of_order,
+    stack_results,
     take_entries,
     variable_jet,
 )
@@ -45,7 +45,7 @@ from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet, Scalar, sqrt
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.pairs.base import RubbingContact, ToothContact
-from planar.model.pairs.rubbing import ContactLoad, LoadLaw
+from planar.model.pairs.rubbing import LoadLaw
 from planar.results.motion import Motion, State
 
 FIXED_FRICTION_STEPS, MAX_FRICTION_STEPS = 2, 7
@@ -58,44 +58,49 @@ TIE = 1e-9
 ROUNDING = 1e-12
 """Of the greatest change with the factors of loads: a lesser one is none."""
 
-LinkForces = dict[str, list[Scalar]]
-"""By link what acts on its coordinates x, y and angle (N, N, N m about its origin)."""
 
+class ForceBalance:
+    """The balance of all links in their forces y, and what does not change with small changes: in which sense teeth
+    press (n, toothed pairs) and each pair rubs (n,), and one for the greatest part of each contact's loads, zero for
+    the others (n, parts)."""
 
-@dataclass
-class ForceConstants:
-    """What stays under small changes, at positions (n, ...): the full turns of springs, in which sense teeth press, in
-    which sense each pair rubs, and one for the part that each contact follows, zero for others."""
-
-    spring_turns: Array
-    pressing: Array
-    senses: Array
-    leading: Array
-
-
-class _Contact(NamedTuple):
-    """A contact at positions of any arithmetic, with its pair's index among those that rub, and the places of its parts
-    among all."""
-
-    pair: Pair
-    rubbing: RubbingContact
-    pair_index: int
-    parts: range
+    def __init__(self, elements: ConstraintElements, motion: CoordinateMotion, count: int = 1):
+        """`motion` are the `count` positions."""
+        self.elements = elements
+        pairs = motion.mechanism.pairs
+        self.inputs = tuple(driven.pair for driven in motion.mechanism.inputs)
+        self.toothed = [
+            pair.name for pair in pairs if pair.tooth_contact(motion.frames, motion.shapes, pairs) is not None
+        ]
+        placed = {name: element for name, element in elements.placed_pairs.items() if name not in self.toothed}
+        by_rows = {element.rows.start: name for name, element in placed.items()}
+        self.groups = [
+            (group, [by_rows[int(row)] for row in group.rows[:, 0]]) for group in group_elements(placed.values())
+        ]
+        self.first_friction = elements.row_count
+        self.rubs = False
+        self.pressing: Array = np.zeros((count, len(self.toothed)))
+        self.senses: dict[str, Array] = {}
+        self.leading: dict[int, Array] = {}
 
 
 class BalanceAtPositions:
     """The balance at positions of any arithmetic, from coordinates, numbers of the file and forces y."""
 
-    def __init__(self, of: ForceSlopes, motion: CoordinateMotion, y: Scalar, factors: Sequence[Scalar], order: int = 1):
+    def __init__(self, of: ForceBalance, motion: CoordinateMotion, y: Scalar, order: int = 1):
         """`order` is that of the jets, 1 without any."""
-        self.of, self.motion, self.y, self.factors, self.order = of, motion, y, factors, order
+        self.of, self.motion, self.y, self.order = of, motion, y, order
         self.pairs = {pair.name: pair for pair in motion.mechanism.pairs}
-        self._constraint_forces: dict[str, tuple[list[Scalar], int]] = {}
+        self._exerted: dict[str, list[Scalar]] = {}
+        "by pair, what its constraints do on its local coordinates"
         for group, names in of.groups:
-            exerted = self._exerted(group)
-            self._constraint_forces |= {name: (exerted, place) for place, name in enumerate(names)}
+            exerted = self._exerted_by_group(group)
+            for place, name in enumerate(names):
+                self._exerted[name] = [
+                    value if isinstance(value, float) else take_entries(value, place) for value in exerted
+                ]
 
-    def _exerted(self, group: ElementGroup) -> list[Scalar]:
+    def _exerted_by_group(self, group: ElementGroup) -> list[Scalar]:
         """What the constraints of a group of pairs do on their local coordinates."""
         element = group.element
         positions = self.motion.q.parts[0]
@@ -109,9 +114,8 @@ class BalanceAtPositions:
             exerted[column] = exerted[column] + multipliers[row] * slope
         return exerted
 
-    def _constant(self, name: str, index: int) -> Array:
-        """One of `ForceConstants` (n, 1), or (n, 1, 1) beside jets of the second order."""
-        column: Array = getattr(self.of.constants, name)[:, index]
+    def _constant(self, column: Array) -> Array:
+        """A number at every position (n,) as (n, 1), or (n, 1, 1) beside jets of the second order."""
         return column.reshape(-1, *((1,) * self.order))
 
     @cached_property
@@ -125,26 +129,16 @@ class BalanceAtPositions:
         return {name: contact for name, contact in contacts.items() if contact is not None}
 
     @cached_property
-    def rubbing_contacts(self) -> list[_Contact]:
+    def rubbing_contacts(self) -> list[tuple[Pair, RubbingContact]]:
         """Where pairs rub."""
-        pairs, contacts, first = self.motion.mechanism.pairs, [], 0
-        names: list[str] = []
-        for pair in pairs if self.of.rubs else ():
-            for rubbing in pair.rubbing_contacts(self.motion.frames, self.motion.shapes, pairs, False):
-                if pair.name not in names:
-                    names.append(pair.name)
-                count = len(rubbing.loads) * (2 if rubbing.law is LoadLaw.GREATEST else 1)
-                contacts.append(_Contact(pair, rubbing, len(names) - 1, range(first, first + count)))
-                first += count
-        return contacts
+        pairs = self.motion.mechanism.pairs
+        return [
+            (pair, contact)
+            for pair in (pairs if self.of.rubs else ())
+            for contact in pair.rubbing_contacts(self.motion.frames, self.motion.shapes, pairs, False)
+        ]
 
-    def forces_on_links(self, actions: Iterable[LinkAction]) -> LinkForces:
-        """The sums of actions on the coordinates of moving links."""
-        total: LinkForces = {}
-        for action in actions:
-            if action.link in self.of.elements.link_columns:
-                _add_forces(total, action.link, action_on_link(self.motion, action))
-        return total
+    # actions of pairs and inputs
 
     def _tooth_actions(self, name: str, apart: bool) -> Iterator[LinkAction]:
         """Teeth drive, and push each other apart, in whichever sense they press."""
@@ -152,122 +146,106 @@ class BalanceAtPositions:
         press = take_entries(self.y, self.of.elements.pair_rows[name].start)
         force = contact.drive_direction * press
         if apart:
-            sense = self._constant("pressing", self.of.toothed.index(name))
+            sense = self._constant(self.of.pressing[:, self.of.toothed.index(name)])
             force = force + contact.separation_direction * (press * sense * contact.pressure_tangent)
         for link, sign in ((second, 1.0), (first, -1.0)):
             yield LinkAction("pair", name, link, contact.pitch_point, force * sign, 0.0)
 
-    def constraint_forces(self, name: str, apart: bool = True) -> LinkForces:
-        """What the constraints of a pair do; teeth push each other `apart`, or only drive."""
+    def _constraint_actions(self, name: str, apart: bool = True) -> Iterator[LinkAction]:
+        """What the constraints of a pair do to moving links; teeth push each other `apart`, or only drive."""
         if name in self.contacts:
-            return self.forces_on_links(self._tooth_actions(name, apart))
-        exerted, place = self._constraint_forces[name]
-        total: LinkForces = {}
+            yield from self._tooth_actions(name, apart)
+            return
         moving = [link for link in self.pairs[name].bodies if link in self.of.elements.link_columns]
         for body, link in enumerate(moving):
-            _add_forces(total, link, [_take_place(exerted[3 * body + k], place) for k in range(3)])
-        return total
+            frame, (x, y, couple) = self.motion.frame(link), self._exerted[name][3 * body : 3 * body + 3]
+            yield LinkAction("pair", name, link, Vector(frame.x, frame.y), Vector(x, y), couple)
 
     def _friction_size(self, index: int) -> Scalar:
         return take_entries(self.y, self.of.first_friction + index)
 
     def _friction(self, index: int) -> Scalar:
         """What friction in a contact does in the positive sense of its action (N, N m)."""
-        contact = self.rubbing_contacts[index]
-        sense = -contact.rubbing.rate_sense * self._constant("senses", contact.pair_index)
-        return self._friction_size(index) * sense
+        pair, contact = self.rubbing_contacts[index]
+        return self._friction_size(index) * (-contact.rate_sense * self._constant(self.of.senses[pair.name]))
 
     def _friction_actions(self, name: str | None = None) -> Iterator[LinkAction]:
         """What friction in a pair, or in all, does on links."""
-        for index, contact in enumerate(self.rubbing_contacts):
-            pair = contact.pair.name
-            if name in (None, pair):
-                yield from two_sided_actions(
-                    self.motion, "friction", pair, contact.rubbing.action, self._friction(index)
-                )
-
-    def pair_forces(self, name: str) -> LinkForces:
-        """What a pair does on the links that move, with its friction."""
-        total = self.constraint_forces(name)
-        for link, parts in self.forces_on_links(self._friction_actions(name)).items():
-            _add_forces(total, link, parts)
-        return total
+        for index, (pair, contact) in enumerate(self.rubbing_contacts):
+            if name in (None, pair.name):
+                yield from two_sided_actions(self.motion, "friction", pair.name, contact.action, self._friction(index))
 
     def effort(self, index: int) -> Scalar:
         """What an input supplies (N, N m)."""
         return take_entries(self.y, self.of.elements.constraint_count + index)
 
-    def open_balance(self, orders: Sequence[int], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
-        """By how much the balance is open (n, coordinates and contacts, ...): values, for an order of 0, or the
-        derivatives of an order, in these shapes."""
-        totals: list[Array] = [np.zeros(shape) for shape in shapes]
+    def pair_wrench(self, name: str, link: str) -> tuple[Vector, Scalar]:
+        """The force of a pair on a link, with its friction, and the moment about the world's origin."""
+        return self._wrench([*self._constraint_actions(name), *self._friction_actions(name)], link)
 
-        def add(column: int, value: Scalar) -> None:
-            for total, order in zip(totals, orders, strict=True):
-                total[:, column] += slopes_of_order(value, order)
+    def _wrench(self, actions: Iterable[LinkAction], link: str) -> tuple[Vector, Scalar]:
+        """The sum of a pair's actions on a link; the action on the frame balances those on the moving links."""
+        moving = self.of.elements.link_columns
+        terms = [
+            (action.force.x, action.force.y, action.place.cross(action.force) + action.couple)
+            for action in actions
+            if (action.link == link if link in moving else action.link in moving)
+        ]
+        sign = 1.0 if link in moving else -1.0
+        x, y, moment = (sum(parts, 0.0) * sign for parts in zip(*terms, strict=True))
+        return Vector(x, y), moment
 
-        for group, names in self.of.groups:
-            exerted, _ = self._constraint_forces[names[0]]
-            for column, value in enumerate(exerted):
-                for place, coordinate in enumerate(group.coordinates[:, column]):  # a link may be in several
-                    add(int(coordinate), _take_place(value, place))
-        turns = [self._constant("spring_turns", k) for k in range(len(self.motion.mechanism.springs))]
-        actions = [*passive_actions(self.motion, self.factors, turns)]
-        actions += inertia_actions(self.motion) if self.of.with_inertia else ()
+    # the equations
+
+    def open_rows(self, actions: Iterable[LinkAction]) -> list[Scalar]:
+        """By how much the balance is open under some actions on the links: of every coordinate, then of contacts."""
+        elements = self.of.elements
+        rows: list[Scalar] = [0.0] * elements.coordinate_count
+        for name, exerted in self._exerted.items():  # a link may be two bodies of a pair
+            for column, value in zip(elements.placed_pairs[name].coordinates, exerted, strict=True):
+                rows[column] = rows[column] + value
+        actions = [*actions, *self._friction_actions()]
         for index, name in enumerate(self.of.inputs):
             actions += effort_actions(self.motion, "input", name, self.effort(index))
         for name in self.contacts:
             actions += self._tooth_actions(name, True)
-        for link, parts in self.forces_on_links([*actions, *self._friction_actions()]).items():
-            first = self.of.elements.link_columns[link]
-            for k, part in enumerate(parts):
-                add(first + k, part)
-        for index, contact in enumerate(self.rubbing_contacts):
-            add(self.of.elements.coordinate_count + index, self._friction_size(index) - self._required_size(contact))
-        return totals
+        for action in actions:
+            if action.link in elements.link_columns:
+                first = elements.link_columns[action.link]
+                for column, part in enumerate(action_on_link(self.motion, action), first):
+                    rows[column] = rows[column] + part
+        contacts = range(len(self.rubbing_contacts))
+        return [*rows, *(self._friction_size(index) - self._required_size(index) for index in contacts)]
 
-    def _required_size(self, contact: _Contact) -> Scalar:
-        """How great a contact is by what its pair's constraints exert."""
-        parts = self.parts(contact)
-        if contact.rubbing.law is LoadLaw.RESULTANT:
+    def _required_size(self, index: int) -> Scalar:
+        """How great the friction of a contact is by what its pair's constraints exert."""
+        law, parts = self.rubbing_contacts[index][1].law, self.load_parts(index)
+        if law is LoadLaw.RESULTANT:
             return sqrt(sum((part * part for part in parts[1:]), parts[0] * parts[0]))
-        leading = (self._constant("leading", index) for index in contact.parts)
-        return sum((part * is_leading for part, is_leading in zip(parts, leading, strict=True)), 0.0)
+        if law is LoadLaw.SIGNED:
+            return parts[0]
+        leading = self.of.leading[index].T
+        return sum((part * self._constant(is_leading) for part, is_leading in zip(parts, leading, strict=True)), 0.0)
 
-    def parts(self, contact: _Contact) -> list[Scalar]:
-        """What a contact follows: of forces along ways or couples, each times its factor."""
-        sense = self._constant("senses", contact.pair_index)
+    def load_parts(self, index: int) -> list[Scalar]:
+        """The parts of forces, or couples, that a contact follows, each times its factor."""
+        pair, contact = self.rubbing_contacts[index]
         parts: list[Scalar] = []
-        for load in contact.rubbing.loads:
-            value = self._load(contact.pair, load)
-            if contact.rubbing.law is not LoadLaw.GREATEST:
+        for load in contact.loads:
+            force, moment = self._wrench(self._constraint_actions(pair.name, apart=False), load.link)
+            if load.direction is not None:
+                value = load.direction.dot(force)
+            else:
+                assert load.place is not None
+                value = moment - load.place.cross(force)
+            if contact.law is not LoadLaw.GREATEST:
                 parts.append(value * load.factor)
                 continue
             opposed = load.factor if load.opposed is None else load.opposed
+            sense = self._constant(self.of.senses[pair.name])
             mean, half = (load.factor + opposed) * 0.5, (load.factor - opposed) * 0.5 * sense
             parts += [value * (mean + half), -value * (mean - half)]
         return parts
-
-    def _load(self, pair: Pair, load: ContactLoad) -> Scalar:
-        """A part of what a pair's constraints exert on a link."""
-        force, moment = self._wrench(self.constraint_forces(pair.name, apart=False), load.link)
-        if load.direction is not None:
-            return load.direction.dot(force)
-        assert load.place is not None
-        return moment - load.place.cross(force)
-
-    def _wrench(self, forces: LinkForces, link: str) -> tuple[Vector, Scalar]:
-        """What a pair exerts on a link by its forces on moving links: the force, and the moment about the world's
-        origin; on the frame acts what adds up to nothing."""
-        wrenches: dict[str, tuple[Scalar, Scalar, Scalar]] = {}
-        for body, (x, y, moment) in forces.items():
-            frame = self.motion.frame(body)
-            wrenches[body] = x, y, moment + (frame.x * y - frame.y * x)
-        if link in wrenches:
-            x, y, moment = wrenches[link]
-        else:
-            x, y, moment = (-sum((wrench[k] for wrench in wrenches.values()), 0.0) for k in range(3))
-        return Vector(x, y), moment
 
     # results
 
@@ -284,13 +262,13 @@ class BalanceAtPositions:
             results.append(NamedResult("effort", effort_kind, (effort,)))
             results.append(NamedResult("power", "power", (velocity * effort,)))
         if name in self.pairs:
-            force, moment = self._wrench(self.pair_forces(name), self.pairs[name].links[1])
+            force, moment = self.pair_wrench(name, self.pairs[name].links[1])
             place = self._reaction_point(self.pairs[name])
             couple = moment if place is None else moment - place.cross(force)
             results.append(NamedResult("force", "force", tuple(force)))
             results.append(NamedResult("couple", "torque", (couple,)))
-        for index, contact in enumerate(self.rubbing_contacts):
-            if contact.pair.name == name:
+        for index, (pair, _) in enumerate(self.rubbing_contacts):
+            if pair.name == name:
                 results.append(NamedResult("friction", effort_kind, (self._friction(index),)))
                 break
         return results
@@ -303,16 +281,7 @@ class BalanceAtPositions:
         return self.motion.place(end[0], self.motion.shapes[end[0]].position(end[1])) if end else None
 
 
-def _add_forces(total: LinkForces, link: str, parts: Sequence[Scalar]) -> None:
-    """Add forces on the coordinates of a link."""
-    total[link] = [one + other for one, other in zip(total.get(link, [0.0] * 3), parts, strict=True)]
-
-
-def _take_place(value: Scalar, place: int) -> Scalar:
-    return value if isinstance(value, float) else take_entries(value, place)
-
-
-class ForceSlopes:
+class ForceSlopes(ForceBalance):
     """The derivatives of forces at positions (n), in the parameters and then in the factors of the loads."""
 
     def __init__(
@@ -320,28 +289,15 @@ class ForceSlopes:
     ):
         """`rows` are the positions among those of the forces, of which friction and inertia are taken, `factors`
         (n, loads) those of the loads there."""
-        self.kinematics, self.elements = kinematics, kinematics.elements
-        parameters = kinematics.parameters
-        self.inputs, self.rubs = parameters.inputs, forces is not None and bool(forces.friction)
-        self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
-        self.factors = factors
+        self.kinematics, count = kinematics, len(factors)
         self._balances: dict[int, BalanceAtPositions] = {}
-        constants = [rates[..., None] for rates in kinematics.rates]
-        self.motion = CoordinateMotion(self.elements, kinematics.numbers(0), parameters.unit, Jet(*constants))
-        count = len(factors)
-        pairs = parameters.mechanism.pairs
-        self.toothed = [
-            pair.name for pair in pairs if pair.tooth_contact(self.motion.frames, self.motion.shapes, pairs) is not None
-        ]
-        placed = {name: element for name, element in self.elements.placed_pairs.items() if name not in self.toothed}
-        by_rows = {element.rows.start: name for name, element in placed.items()}
-        self.groups = [
-            (group, [by_rows[int(row)] for row in group.rows[:, 0]]) for group in group_elements(placed.values())
-        ]
-        self.first_friction = self.elements.row_count
-        none: Array = np.zeros((count, 0))
-        self.constants = ForceConstants(spring_turns, np.zeros((count, len(self.toothed))), none, none)
-        contacts = self._values(np.zeros((count, self.first_friction))).rubbing_contacts
+        unit, constants = kinematics.parameters.unit, [rates[..., None] for rates in kinematics.rates]
+        self.motion = CoordinateMotion(kinematics.elements, kinematics.numbers(0), unit, Jet(*constants))
+        super().__init__(kinematics.elements, self.motion, count)
+        self.rubs = forces is not None and bool(forces.friction)
+        self.with_inertia = forces is not None and any(action.kind == "inertia" for action in forces.acting)
+        self.factors, self.spring_turns = factors, spring_turns
+        contacts = self._at(np.zeros((count, self.first_friction, 1))).rubbing_contacts
         self.unknown_count = self.first_friction + len(contacts)
         self.is_unknown: BoolArray = np.zeros(count, bool)
         "(n,): where the solution is on a kink of friction, or no forces are known"
@@ -351,46 +307,49 @@ class ForceSlopes:
             for _ in range(2 if self.toothed else 1):  # first which way teeth press
                 opening, slopes = self._linearise(np.zeros((count, self.unknown_count)))
                 self.y = _close_balance(slopes, invert_matrices(slopes)[0], opening)[..., 0]
-                self.constants.pressing = np.sign(self.y[:, self._pressing_rows])
+                self._set_pressing(self.y)
+        self._jacobian = self._linearise(self.y)[1]
+        self._inverse = invert_matrices(self._jacobian)[0]
 
-    @property
-    def _pressing_rows(self) -> list[int]:
-        return [self.elements.pair_rows[name].start for name in self.toothed]
+    def _set_pressing(self, y: Array) -> None:
+        self.pressing = np.sign(y[:, [self.elements.pair_rows[name].start for name in self.toothed]])
 
-    def _values(self, y: Array) -> BalanceAtPositions:
-        """The balance of numbers, at forces y (n, unknowns)."""
-        return BalanceAtPositions(self, self.motion, y[..., None], list(self.factors.T[..., None]))
+    def _at(self, y: Scalar) -> BalanceAtPositions:
+        """The balance at forces y, numbers (n, unknowns, 1) or jets along some changes of these."""
+        return BalanceAtPositions(self, self.motion, y)
+
+    def _open(self, balance: BalanceAtPositions, factors: Sequence[Scalar]) -> list[Scalar]:
+        """By how much a balance is open under loads with these factors, weights, springs and inertia."""
+        turns = [column.reshape(-1, *((1,) * balance.order)) for column in self.spring_turns.T]
+        actions = [*passive_actions(balance.motion, factors, turns)]
+        with np.errstate(all="ignore"):  # what is not defined is not a number
+            return balance.open_rows([*actions, *(inertia_actions(balance.motion) if self.with_inertia else ())])
 
     def _linearise(self, y: Array) -> tuple[Array, Array]:
         """By how much the balance is open (n, rows, 1), and its Jacobian (n, rows, unknowns) in the forces."""
         count = self.unknown_count
         unit: Array = np.broadcast_to(np.eye(count), (len(y), count, count))
-        balance = BalanceAtPositions(self, self.motion, variable_jet(y, unit), list(self.factors.T[..., None]))
-        rows = self.elements.coordinate_count + count - self.first_friction
-        with np.errstate(all="ignore"):  # what is not defined is not a number
-            opening, slopes = balance.open_balance([0, 1], [(len(y), rows, 1), (len(y), rows, count)])
-        return opening, slopes
+        rows = self._open(self._at(variable_jet(y, unit)), list(self.factors.T[..., None]))
+        return stack_results(rows, 0, (len(y),))[..., None], stack_results(rows, 1, (len(y), count))
 
-    def _solve_with_friction(self, forces: Forces, rows_of_all: slice, contacts: list[_Contact]) -> Array:
+    def _solve_with_friction(
+        self, forces: Forces, rows_of_all: slice, contacts: Sequence[tuple[Pair, RubbingContact]]
+    ) -> Array:
         """The forces with friction, by Newton's method from the friction of the solution, on its side of all kinks."""
         count, first_friction = len(self.factors), self.first_friction
-        names = list(dict.fromkeys(contact.pair.name for contact in contacts))
 
-        def columns(values: Sequence[Array | float]) -> Array:
-            """Values at all positions, or alike at all, as columns (n, values) at these."""
-            rows = [value if np.ndim(value) == 0 else np.asarray(value)[rows_of_all] for value in values]
-            return np.stack([np.broadcast_to(row, (count,)) for row in rows], axis=1)
+        def at_positions(value: Array | float) -> Array:
+            """A value at all positions, or the same at all, at these (n,)."""
+            rows = value if np.ndim(value) == 0 else np.asarray(value)[rows_of_all]
+            return np.broadcast_to(np.asarray(rows, dtype=float), (count,))
 
-        senses = columns([forces.friction[name].sense for name in names])
-        first_of_pair = np.array(
-            [k == 0 or contacts[k - 1].pair_index != contact.pair_index for k, contact in enumerate(contacts)]
-        )
-        acts = first_of_pair & (senses[:, [contact.pair_index for contact in contacts]] != 0.0)
-        known = columns([np.abs(forces.friction[contact.pair.name].effort) for contact in contacts])
+        names = [pair.name for pair, _ in contacts]
+        self.senses = {name: at_positions(forces.friction[name].sense) for name in names}
+        is_first = np.array([names.index(name) == k for k, name in enumerate(names)])
+        acts = is_first & (np.stack([self.senses[name] for name in names], axis=1) != 0.0)
+        known = np.stack([np.abs(at_positions(forces.friction[name].effort)) for name in names], axis=1)
         y: Array = np.concatenate([np.zeros((count, first_friction)), np.nan_to_num(known) * acts], axis=1)
-        self.constants.senses = senses.astype(float)
-        self.constants.leading = np.zeros((count, contacts[-1].parts.stop))
-        is_tie: BoolArray = np.zeros(count, bool)
+        is_tie = self._choose_greatest(y)
         for step in range(MAX_FRICTION_STEPS):
             opening, slopes = self._linearise(y)
             is_fixed = step < FIXED_FRICTION_STEPS
@@ -399,7 +358,7 @@ class ForceSlopes:
             inverse, _ = invert_matrices(np.nan_to_num(slopes[:, rows, free]))
             change = (inverse @ np.nan_to_num(opening[:, rows]))[..., 0]
             y[:, free] -= change
-            self.constants.pressing = np.sign(y[:, self._pressing_rows])
+            self._set_pressing(y)
             is_tie = self._choose_greatest(y)
         tolerance, last_change = SETTLED * np.abs(y).max(axis=1), np.abs(change).max(axis=1)
         deviation = (np.abs(y[:, first_friction:] - known) * acts).max(axis=1, initial=0.0)
@@ -408,24 +367,15 @@ class ForceSlopes:
 
     def _choose_greatest(self, y: Array) -> BoolArray:
         """Choose which part each contact follows; where two are the greatest (n,)."""
-        balance = self._values(y)
-        leading, is_tie = np.zeros_like(self.constants.leading), np.zeros(len(y), bool)
-        for contact in balance.rubbing_contacts:
-            if contact.rubbing.law is not LoadLaw.GREATEST:
-                leading[:, contact.parts.start] = 1.0
-                continue
-            parts = np.stack([np.broadcast_to(part[:, 0], (len(y),)) for part in balance.parts(contact)], axis=1)
-            leading[np.arange(len(y)), contact.parts.start + np.argmax(parts, axis=1)] = 1.0
-            ordered = np.sort(parts, axis=1)
-            is_tie |= ordered[:, -1] - ordered[:, -2] <= TIE * np.abs(parts).max(axis=1)
-        self.constants.leading = leading
+        balance, is_tie = self._at(y[..., None]), np.zeros(len(y), bool)
+        for index, (_, contact) in enumerate(balance.rubbing_contacts):
+            if contact.law is LoadLaw.GREATEST:
+                columns = [np.broadcast_to(part[:, 0], (len(y),)) for part in balance.load_parts(index)]
+                parts = np.stack(columns, axis=1)
+                self.leading[index] = np.eye(parts.shape[1])[np.argmax(parts, axis=1)]
+                ordered = np.sort(parts, axis=1)
+                is_tie |= ordered[:, -1] - ordered[:, -2] <= TIE * np.abs(parts).max(axis=1)
         return is_tie
-
-    @cached_property
-    def _closing_matrices(self) -> tuple[Array, Array]:
-        """The Jacobian of the balance in the forces that were solved for, and its inverse."""
-        _, slopes = self._linearise(self.y)
-        return slopes, invert_matrices(slopes)[0]
 
     def balance(self, order: int) -> BalanceAtPositions:
         """The balance with the derivatives of all forces of an order, to be asked for results."""
@@ -435,20 +385,18 @@ class ForceSlopes:
 
     def _derive(self, order: int) -> BalanceAtPositions:
         motion = self.kinematics.motion if order == 1 else self.kinematics.second_motion
-        slopes, inverse = self._closing_matrices
         shape = [self.kinematics.count] * order
         lower = [] if order == 1 else [slopes_of_order(self.balance(1).y, 1)]
 
         def balance_with(derivatives: Array) -> BalanceAtPositions:
             """The balance with these derivatives of the highest order (n, unknowns, parameters, ...)."""
-            y = variable_jet(self.y, *lower, derivatives)
-            return BalanceAtPositions(self, motion, y, self._factor_jets(order), order)
+            return BalanceAtPositions(self, motion, variable_jet(self.y, *lower, derivatives), order)
 
         none: Array = np.zeros((len(self.y), self.unknown_count, *shape))
-        with np.errstate(all="ignore"):  # what is not defined is not a number
-            (opening,) = balance_with(none).open_balance([order], [(len(self.y), slopes.shape[1], *shape)])
+        rows = self._open(balance_with(none), self._factor_jets(order))
+        opening = stack_results(rows, order, (len(self.y), *shape))
         columns = opening.reshape(*opening.shape[:2], self.kinematics.count**order)
-        return balance_with(_close_balance(slopes, inverse, columns).reshape(none.shape))
+        return balance_with(_close_balance(self._jacobian, self._inverse, columns).reshape(none.shape))
 
     def _factor_jets(self, order: int) -> list[Scalar]:
         """The factors of the loads, the parameters that follow those of the kinematics."""

@@ -12,14 +12,14 @@ order is a jet of such jets, with two axes. Time derivatives are jets around the
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.derivatives.parameters import Parameters
+from planar.document.dimensions import Dimension, change_dimensions, file_dimensions
 from planar.dynamics.equilibrium import Equilibrium
 from planar.dynamics.external_actions import LinkMotion
 from planar.dynamics.link_coordinates import LinkCoordinates
@@ -28,10 +28,79 @@ from planar.equations.elements import ElementGroup, PlacedElement, group_element
 from planar.equations.mechanism_numbers import equation_structure, shapes_of_links
 from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, Scalar, constant_jet, cos, sin
-from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
+from planar.solving.position import solved_mechanism
+
+DESIGN_SECTIONS = ("links", "pairs", "loads", "springs", "masses", "gravity")
+"""Of the file: numbers of the design itself. Inputs run, sketches choose, and neither changes what is solved."""
+INPUT_RATES = ("position", "velocity", "acceleration")
+
+
+def design_dimensions(mechanism: Mechanism) -> tuple[Dimension, ...]:
+    """The numbers of a mechanism's file that are no counts, no stops, and no numbers of its inputs' courses."""
+    return tuple(
+        dimension
+        for dimension in file_dimensions(mechanism).values()
+        if dimension.path[0] in DESIGN_SECTIONS
+        and dimension.kind != "count"
+        and dimension.address[0] not in ("stops", "pair_stiffness")
+        and "varies" not in dimension.address
+    )
+
+
+class Parameters:
+    """The parameters of a mechanism: `names`, `dimensions` of the file, and `unit`, its size (m).
+
+    `offsets` name pairs whose pins may stand aside in their holes: by `clearance.B.x` and `clearance.B.y` (m, in the
+    axes of the pair's first link), the last ones. Raises BadInput of a mechanism of which no derivatives are known.
+    """
+
+    def __init__(self, mechanism: Mechanism, offsets: tuple[str, ...] = ()):
+        solver = solved_mechanism(mechanism).solver
+        solver.refuse_misfit("derivatives are not told")
+        for pair in mechanism.pairs:
+            if not pair.measures_symbols:
+                raise BadInput(pair.name, "derivatives are not told of a mechanism with a cam of given points")
+        self.mechanism, self.offsets, self.unit = mechanism, offsets, solver.unit
+        self.file_dimensions = design_dimensions(mechanism)
+        self.dimensions = (
+            *self.file_dimensions,
+            *(_offset_dimension(pair, axis) for pair in offsets for axis in "xy"),
+        )
+        self.inputs = tuple(given.pair for given in mechanism.inputs)
+        self.names = (
+            *(f"{name}.{rate}" for rate in INPUT_RATES for name in self.inputs),
+            *(dimension.name for dimension in self.dimensions),
+        )
+
+    @cached_property
+    def scale(self) -> Array:
+        """What each parameter is in units of (parameters,): m for a length of the mechanism's size, else as it is."""
+        motions = relative_motions(self.mechanism)
+        kinds = [motions[name].input_quantity_kinds()[0] for name in self.inputs] * len(INPUT_RATES)
+        kinds += [dimension.kind for dimension in self.dimensions]
+        return np.array([self.unit if kind == "length" else 1.0 for kind in kinds])
+
+    def mechanism_with(self, numbers: Sequence[Scalar]) -> Mechanism:
+        """The mechanism with other numbers, of any arithmetic, in place of those of the file; inputs, courses of loads
+        and stops are left out."""
+        changed = replace(
+            self.mechanism,
+            inputs=tuple(Input(name, 0.0) for name in self.inputs),
+            loads=tuple(load._replace(varies=None) for load in self.mechanism.loads),
+            stops=(),
+        )
+        return change_dimensions(changed, zip(self.file_dimensions, numbers, strict=True))
+
+
+def _offset_dimension(pair: str, axis: str) -> Dimension:
+    place = ("tolerances", "clearance", pair, axis)
+    return Dimension(f"clearance.{pair}.{axis}", 0.0, "length", "", place, place)
+
 
 TINY = 1e-300
 ROUNDING = 1e-15
@@ -156,57 +225,37 @@ class Directions:
 
 
 class FileNumbers:
-    """The numbers of a mechanism as jets of an order in all parameters: its `mechanism`, `shapes`, `measured` numbers
-    of pairs by name, and `p`, those of all constraints one after the other; of order 0 as they are."""
+    """A mechanism with numbers of any arithmetic in place of those of its file: its `mechanism`, `shapes`, `measured`
+    numbers of pairs by name, and `p`, those of all constraints one after the other."""
 
     def __init__(
         self,
         parameters: Parameters,
-        elements: ConstraintElements,
-        directions: Directions,
-        order: int,
-        values: Sequence[Any] | None = None,
+        pairs: Iterable[str],
+        numbers: Sequence[Scalar],
+        stack: Callable[[Sequence[Scalar]], Scalar],
     ):
-        """`values` are those of the dimensions, by default of the file: numbers, or arrays (n,) for n positions."""
-        first = 3 * len(parameters.inputs)
-
-        def number(index: int) -> Scalar:
-            value = parameters.dimensions[index].value if values is None else values[index]
-            if np.ndim(value):
-                value = np.reshape(value, (-1, *((1,) * max(order, 1))))
-            return directions.jet(first + index, value, order)
-
+        """`numbers` are those of the dimensions; `stack` makes p (1 or n, numbers, ...) of the numbers of `pairs`."""
         file_count = len(parameters.file_dimensions)
-        self.mechanism = parameters.mechanism_with([number(k) for k in range(file_count)])
+        self.mechanism = parameters.mechanism_with(numbers[:file_count])
         self.shapes = shapes_of_links(self.mechanism)
         self.relative_motions = relative_motions(self.mechanism)
-        pairs = {pair.name: pair for pair in self.mechanism.pairs} | dict(self.relative_motions)
+        known = {pair.name: pair for pair in self.mechanism.pairs} | dict(self.relative_motions)
         self.measured = {
-            name: list(pair.measure([self.shapes[link] for link in pair.bodies])) for name, pair in pairs.items()
+            name: list(pair.measure([self.shapes[link] for link in pair.bodies])) for name, pair in known.items()
         }
         for k, name in enumerate(parameters.offsets):
-            offset = Vector(number(file_count + 2 * k), number(file_count + 2 * k + 1))
-            self.measured[name] = list(pairs[name].offset_pin(self.measured[name], offset))
-        of_pairs = [value for name in elements.numbered_pairs for value in self.measured[name]]
-        self.p = stack_numbers(of_pairs, directions.count, order)
+            offset = Vector(*numbers[file_count + 2 * k : file_count + 2 * k + 2])
+            self.measured[name] = list(known[name].offset_pin(self.measured[name], offset))
+        self.p = stack([value for name in pairs for value in self.measured[name]])
 
 
-class RatedMotion(LinkMotion):
-    """Positions of links and of relative motions with rates, in any arithmetic."""
+class CoordinateMotion(LinkMotion):
+    """Positions of links and of relative motions from the coordinates q of links, jets in time of arrays (n,
+    coordinates, ...) or of symbols (1, coordinates)."""
 
-    orders: int
-    "how many rates are known, the position among them"
-
-    @abstractmethod
-    def input_position(self, pair: Pair) -> Jet:
-        """The position of a relative motion with its rates."""
-
-
-class CoordinateMotion(RatedMotion):
-    """Positions of links from their coordinates q, jets in time of arrays (n, coordinates, ...)."""
-
-    def __init__(self, elements: ConstraintElements, numbers: FileNumbers, size: float, q: Jet):
-        self.elements, self.numbers, self._size, self.q = elements, numbers, size, q
+    def __init__(self, columns: LinkCoordinates, numbers: FileNumbers, size: float, q: Jet):
+        self.columns, self.numbers, self._size, self.q = columns, numbers, size, q
         self.mechanism, self.shapes, self.orders = numbers.mechanism, numbers.shapes, len(q.parts)
         self._frames: dict[str, Frame] = {}
 
@@ -217,24 +266,25 @@ class CoordinateMotion(RatedMotion):
     def moving_frame(self, link: str) -> Frame:
         """A link's axes as jets in time."""
         if link not in self._frames:
-            first = self.elements.link_columns[link]
+            first = self.columns.link_columns[link]
             self._frames[link] = frame_at(*(take_entries(self.q, first + k) for k in range(3)))
         return self._frames[link]
 
     def frame_rates(self, link: str) -> Sequence[Sequence[Scalar]]:
-        if link not in self.elements.link_columns:
+        if link not in self.columns.link_columns:
             return GROUND_RATES
         parts = [part.parts for part in self.moving_frame(link)[:5]]
         return [[part[rate] for part in parts] for rate in range(len(parts[0]))]
 
     def own_coordinates(self, name: str) -> tuple[Jet, ...]:
         """The coordinates of a pair's own as jets in time."""
-        columns = self.elements.own_slices.get(name, slice(0, 0))
+        columns = self.columns.own_slices.get(name, slice(0, 0))
         return tuple(take_entries(self.q, k) for k in range(columns.start, columns.stop))
 
     def input_position(self, pair: Pair) -> Jet:
+        """The position of a relative motion with its rates."""
         frames = [
-            self.moving_frame(link) if link in self.elements.link_columns else self.frame(link) for link in pair.bodies
+            self.moving_frame(link) if link in self.columns.link_columns else self.frame(link) for link in pair.bodies
         ]
         numbers = [constant_jet(number, self.orders) for number in self.numbers.measured[pair.name]]
         position = pair.input_position(frames, numbers, self.own_coordinates(pair.name))
@@ -244,8 +294,8 @@ class CoordinateMotion(RatedMotion):
 class KinematicSlopes:
     """The derivatives of all coordinates and their rates at positions (n), in the parameters.
 
-    `rates` are the coordinates (n, coordinates), alone or with their first and second rates; `values` as of
-    `FileNumbers`.
+    `rates` are the coordinates (n, coordinates), alone or with their first and second rates; `values` are those of the
+    dimensions, by default of the file: numbers, or arrays (n,) for n positions.
     """
 
     def __init__(
@@ -275,8 +325,15 @@ class KinematicSlopes:
         self.first_slopes = self._solve(1, self.first_numbers)
 
     def numbers(self, order: int) -> FileNumbers:
-        """The numbers of the file of an order."""
-        return FileNumbers(self.parameters, self.elements, self.directions, order, self._values)
+        """The numbers of the file as jets of an order; of order 0 as they are."""
+        first = 3 * len(self.parameters.inputs)
+        dimensions = self.parameters.dimensions
+        numbers = []
+        for index, value in enumerate([d.value for d in dimensions] if self._values is None else self._values):
+            shaped = np.reshape(value, (-1, *((1,) * max(order, 1)))) if np.ndim(value) else value
+            numbers.append(self.directions.jet(first + index, shaped, order))
+        pairs = self.elements.numbered_pairs
+        return FileNumbers(self.parameters, pairs, numbers, lambda values: stack_numbers(values, self.count, order))
 
     def _scaled_jacobian(self, p: Array) -> SparseMatrices:
         """dF/dq (n, rows, coordinates), lengths in sizes of the mechanism."""
@@ -376,7 +433,7 @@ POINT_RESULTS = {"position": "length", "velocity": "velocity", "acceleration": "
 LINK_RESULTS = ("angle", "angular_velocity", "angular_acceleration")
 
 
-def kinematic_results(motion: RatedMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
+def kinematic_results(motion: CoordinateMotion, points: Mapping[str, tuple[str, str]], name: str) -> list[NamedResult]:
     """The results of a state of a name: of a point, else of a link, and of a pair; `points` are (link, point) by name.
 
     Without rates only what follows from positions.

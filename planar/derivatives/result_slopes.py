@@ -17,11 +17,12 @@ from planar.derivatives.kinematic_slopes import (
     Directions,
     KinematicSlopes,
     NamedResult,
+    Parameters,
     constraint_elements,
+    design_dimensions,
     kinematic_results,
     stack_results,
 )
-from planar.derivatives.parameters import Parameters, design_dimensions
 from planar.document.dimensions import Dimension, value_at
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.forces import Forces
@@ -125,7 +126,7 @@ class SlopeSystem:
         inputs = {name: np.broadcast_to(driven.position, (self.count,)) for name, driven in self.moving.inputs.items()}
         return load_factors(self.moving.mechanism, inputs, getattr(self.moving, "time", None), self.count)
 
-    def _parts(self, order: int = 1) -> Iterator[PositionSlopes]:
+    def parts(self, order: int = 1) -> Iterator[PositionSlopes]:
         """The derivatives of an order, part after part of the positions."""
         size = len(self.rates[0][0]) * self.directions.count**order
         step = max(1, MAX_CHUNK_NUMBERS // max(size, 1))
@@ -143,7 +144,7 @@ class SlopeSystem:
         slopes: dict[str, list[Array]] = {}
         kinds: dict[str, str] = {}
         singular_rows, unknown_rows, tied = [], [], set[str]()
-        for part in self._parts():
+        for part in self.parts():
             singular_rows.append(part.is_singular)
             unknown_rows.append(part.is_unknown)
             is_tied: BoolArray = np.asarray(part.kinematics.tied.any(axis=0))
@@ -182,16 +183,6 @@ class SlopeSystem:
         slopes = {result: np.where(is_free, array, np.nan) for result, array in derived.slopes.items()}
         return derived._replace(slopes=slopes, tied=tuple(number for number in self.names if number in bound))
 
-    def second_slopes(self, name: str, result: str) -> Array:
-        """The second derivatives of a result (n, parts, parameters, parameters)."""
-        count = len(self.names)
-        rows = []
-        for part in self._parts(2):
-            (values,) = (named.parts for named in part.results(name, 2) if named.name == result)
-            shape = part.count, self.directions.count, self.directions.count
-            rows.append(stack_results(values, 2, shape)[:, :, :count, :count])
-        return np.concatenate(rows)
-
 
 def unknown_name(moving: KinematicResult, name: str) -> Unknown:
     """That nothing bears a name."""
@@ -207,9 +198,16 @@ def second_derivatives(
     offsets: tuple[str, ...] = (),
     numbers: Sequence[str] | None = None,
 ) -> Array:
-    """Those of a result of this kind of quantity, see `SlopeSystem`; without rates where positions determine it."""
+    """The second derivatives of a result (n, parts, parameters, parameters), of this kind of quantity; see
+    `SlopeSystem`."""
     has_rates = isinstance(source, Forces) or kind not in POSITION_KINDS
-    return SlopeSystem(source, offsets, has_rates=has_rates, numbers=numbers).second_slopes(of, result)
+    system = SlopeSystem(source, offsets, has_rates=has_rates, numbers=numbers)
+    count, rows = len(system.names), []
+    for part in system.parts(2):
+        (values,) = (named.parts for named in part.results(of, 2) if named.name == result)
+        shape = part.count, system.directions.count, system.directions.count
+        rows.append(stack_results(values, 2, shape)[:, :, :count, :count])
+    return np.concatenate(rows)
 
 
 def tied_dimensions(mechanism: Mechanism, among: Container[str] | None = None) -> tuple[str, ...]:

@@ -73,7 +73,7 @@ def write_design(
 def _places(
     design: DesignEquations, joints: list[NamedPoint], numbers: Mapping[str, float], y: Array
 ) -> list[tuple[float, float]]:
-    frames, _ = design.placed
+    frames = design.positions.frames
     parts = []
     for joint in joints:
         link, point = joint.members[0]

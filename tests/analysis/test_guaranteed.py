@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
-from planar.derivatives.intervals import Intervals, exact
+from planar.derivatives.enclosures import Intervals, ParameterBoxes, ParametricSystem, exact
 from planar.foundation.errors import BadInput, NoAnswer
 from tests.builders import slider_crank
 from tests.command import run

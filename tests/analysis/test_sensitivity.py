@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import planar
 from benchmarks.growth import linkage
 from planar.derivatives import result_slopes
-from planar.derivatives.parameters import design_dimensions
+from planar.derivatives.kinematic_slopes import design_dimensions
 from planar.document.dimensions import change_dimension, file_dimensions
 from planar.document.revised.changed_numbers import with_values
 from planar.dynamics.lagrangian import LagrangianFunctions

@@ -14,7 +14,7 @@ from planar.analysis.calibration.identifiability import Unidentified, describe_u
 from planar.analysis.calibration.measurements import Measurement, read_measurement
 from planar.analysis.calibration.outliers import Outlier, find_outliers
 from planar.derivatives.design_equations import design_equations
-from planar.derivatives.parameters import design_dimensions
+from planar.derivatives.kinematic_slopes import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import Dimension, file_dimensions, find_dimension
 from planar.document.first_argument import takes_mechanism

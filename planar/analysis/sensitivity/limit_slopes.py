@@ -11,8 +11,7 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.time_ratio import Passage, TimeRatio, find_time_ratio
-from planar.derivatives.design_equations import design_equations
-from planar.derivatives.design_systems import LimitEquations, LimitPoint, LimitSystem
+from planar.derivatives.design_equations import LimitEquations, LimitPoint, LimitSystem, design_equations
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.results.motion import Motion, State

@@ -16,7 +16,6 @@ from planar.derivatives.result_slopes import PositionSlopes, SlopeSystem
 from planar.derivatives.transmission_system import loaded_output, output_angle
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
 from planar.model.output_pair import find_output_pair
 from planar.model.pairs import Pair
@@ -67,7 +66,7 @@ def _angle_slopes(moving: State | Motion, of: Transmission, pair: Pair, angle: A
     def output_result(part: PositionSlopes) -> list[NamedResult]:
         assert part.forces is not None
         balance = part.forces.balance(1)
-        forces = [Vector(*balance.pair_forces(name)[of.link][:2]) for name in of.through]
+        forces = [balance.pair_wrench(name, of.link)[0] for name in of.through]
         derived_angle = output_angle(balance.motion, (of.link, pair), of.through, forces)
         return [NamedResult("angle", "angle", (derived_angle,))]
 

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.tolerance.varied import Varied, mean_slopes, slope_bounds
-from planar.derivatives.enclosures import Enclosures, ParametricSystem
-from planar.derivatives.intervals import OVER, down, up
+from planar.derivatives.enclosures import OVER, Enclosures, ParametricSystem, down, up
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.time_limit import MORE_TIME, stop_if_over
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from planar.analysis.tolerance.cover import Undecided
 from planar.analysis.tolerance.varied import Varied
-from planar.derivatives.design_equations import DesignEquations
-from planar.derivatives.design_systems import dead_points_over_boxes, fold_function
+from planar.derivatives.design_equations import DesignEquations, dead_points_over_boxes, fold_function
 from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array

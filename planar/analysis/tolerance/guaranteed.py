@@ -15,8 +15,8 @@ from planar.analysis.tolerance.cover import Cover, Undecided
 from planar.analysis.tolerance.dead_point_proof import DeadPointProof
 from planar.analysis.tolerance.variations import Variations
 from planar.analysis.tolerance.varied import Varied
-from planar.derivatives.design_systems import PositionResult
-from planar.derivatives.intervals import OVER
+from planar.derivatives.design_equations import PositionResult
+from planar.derivatives.enclosures import OVER
 from planar.dynamics.forces import Forces
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome

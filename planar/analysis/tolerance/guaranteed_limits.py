@@ -15,9 +15,8 @@ from planar.analysis.sensitivity.limit_slopes import dead_point_equations, trave
 from planar.analysis.tolerance.guaranteed import Guaranteed
 from planar.analysis.tolerance.variations import Variations
 from planar.analysis.tolerance.varied import Varied, mean_slopes
-from planar.derivatives.design_systems import LimitEquations, LimitSystem
-from planar.derivatives.enclosures import ParametricSystem
-from planar.derivatives.intervals import down, up
+from planar.derivatives.design_equations import LimitEquations, LimitSystem
+from planar.derivatives.enclosures import ParametricSystem, down, up
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.results.motion import Motion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
-from planar.derivatives.parameters import design_dimensions
+from planar.derivatives.kinematic_slopes import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.cursor import Cursor, FileContext
 from planar.document.dimensions import Dimension, input_numbers

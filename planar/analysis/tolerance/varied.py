@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.enclosures import Enclosures, ParameterBoxes, ParametricSystem
-from planar.derivatives.intervals import OVER, Balls, down, up
+from planar.derivatives.enclosures import OVER, Balls, Enclosures, ParameterBoxes, ParametricSystem, down, up
 from planar.foundation.arrays import Array, IntArray
 
 NESTED = 4

@@ -19,7 +19,6 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.batch.gradients.marched_slopes import numbers_of_file, with_rates
 from planar.batch.march.kernel import KernelInstructions, Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.batch.prepare.compiled_runs import (
@@ -46,8 +45,8 @@ from planar.batch.prepare.stages import run_stages
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.derivatives.design_equations import design_equations
-from planar.derivatives.parameters import INPUT_RATES
+from planar.derivatives.design_equations import design_equations, with_rates
+from planar.derivatives.kinematic_slopes import INPUT_RATES
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import block_jacobian
 from planar.equations.symbolic_equations import ConstraintEquations, slice_length
@@ -266,7 +265,7 @@ class GradientWriter:
         reference, equations = self.reference, self.equations
         taken = {
             (kind, k): ca.SX(value)
-            for kind, values in zip("pq", numbers_of_file(reference, equations, self.members), strict=True)
+            for kind, values in (("p", equations.pair_numbers), ("q", equations.point_numbers(self.members)))
             for k, value in enumerate(values)
         }
         weighted = [(value, sums[operand]) for operand, value in taken.items() if operand in sums]

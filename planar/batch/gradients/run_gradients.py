@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
-from planar.batch.general_path import OUTCOMES, point_rows, run_design
+from planar.batch.general_path import OUTCOMES, run_design
 from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
 from planar.batch.prepare.compiled_runs import (
     ALL_SOLVED,
@@ -21,13 +21,10 @@ from planar.batch.prepare.compiled_runs import (
     prepare_runs,
 )
 from planar.batch.reference_design import ReferenceDesign
-from planar.derivatives.kinematic_slopes import CoordinateMotion, KinematicSlopes, constraint_elements, result_array
-from planar.derivatives.parameters import Parameters
-from planar.derivatives.result_slopes import tied_dimensions
-from planar.document.dimensions import value_at
+from planar.derivatives.kinematic_slopes import POINT_RESULTS, CoordinateMotion, NamedResult, Parameters
+from planar.derivatives.result_slopes import SlopeSystem, tied_dimensions
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, Outcome, join_names, suggest_name
-from planar.foundation.jets import Scalar
 from planar.foundation.short_repr import short_repr
 
 ORDERS = ("position", "velocity", "acceleration")
@@ -140,14 +137,13 @@ class RunGradients:
                 "stop", "a slide runs between limits that change with the design; give start and stop for derivatives"
             )
         self.reference, self.points, self.rates = reference, points, rates
-        self.parameters = Parameters(reference.mechanism)
+        self.names = Parameters(reference.mechanism).names
         if not reference.functions.is_square:
             raise BadInput(
                 "pairs",
                 "constraints hold each other more than once here, so that no length can change alone; "
                 "give derivatives a mechanism without the surplus pairs",
             )
-        self.names = self.parameters.names
         self.bound = frozenset(tied_dimensions(reference.mechanism))
         self._positions, self._span = positions, span
         self._width = padded_width(len(positions))
@@ -240,30 +236,27 @@ class RunGradients:
         status: IntArray = np.array(result.status)
         value, total = 0.0, np.zeros(len(self.names))
         if result.motion is not None and result.many:
+            derived = SlopeSystem(result.motion, has_rates=self.rates).derive(
+                lambda part: self._weighted_results(weights.rows, part.kinematics.motion)
+            )
             solved = slice(result.many)
-            coordinates = constraint_elements(mechanism).coordinates(result.motion)[: 3 if self.rates else 1]
-            numbers = [value_at(mechanism, dimension.address) for dimension in self.parameters.dimensions]
-            kinematics = KinematicSlopes(self.parameters, [order[solved] for order in coordinates], values=numbers)
-            w = np.hstack(weights.arrays)[solved]
-            rows = self._rows(kinematics.motion)
-            shape = len(w), len(self.names)
-            slopes = np.zeros(shape)
-            for row, weight in zip(weights.rows, w.T, strict=True):
-                slopes += weight[:, None] * result_array(rows[row], 1, shape)
-            points = point_rows(result.motion, self.points, self.rates)[solved][:, list(weights.rows)]
-            is_valid = ~kinematics.is_singular & np.isfinite(slopes).all(axis=1) & np.isfinite(points).all(axis=1)
+            w: Array = np.stack([array[solved] for array in weights.arrays])
+            coordinates: Array = np.stack([array[solved] for array in derived.values.values()])
+            slopes: Array = np.stack([array[solved] for array in derived.slopes.values()])
+            sums, sum_slopes = np.einsum("rnp,rnp->n", w, coordinates), np.einsum("rnp,rnpk->nk", w, slopes)
+            is_valid = ~derived.is_singular[solved] & np.isfinite(sum_slopes).all(axis=1) & np.isfinite(sums)
             status[solved][~is_valid] = OUTCOMES.index(Outcome.DEAD_POINT)
-            value, total = float((points * w)[is_valid].sum()), slopes[is_valid].sum(axis=0)
+            value, total = float(sums[is_valid].sum()), sum_slopes[is_valid].sum(axis=0)
         total[self._unused] = 0.0
         total[self._bound] = np.nan
         return value, total.tolist(), status
 
-    def _rows(self, motion: CoordinateMotion) -> list[Scalar]:
-        """The results of a run, row by row: x and y of every point, then their rates."""
-        members = [self.reference.point_member(name) for name in self.points]
-        return [
-            part
-            for rate in range(len(motion.q.parts))
-            for link, point in members
-            for part in motion.place(link, motion.shapes[link].position(point), rate)
-        ]
+    def _weighted_results(self, rows: Sequence[int], motion: CoordinateMotion) -> list[NamedResult]:
+        """The points, or their rates, whose x and y are weighted in these rows."""
+        results: list[NamedResult] = []
+        for row in rows[::2]:
+            order, index = divmod(row // 2, len(self.points))
+            link, point = self.reference.point_member(self.points[index])
+            place = motion.place(link, motion.shapes[link].position(point), order)
+            results.append(NamedResult(str(len(results)), POINT_RESULTS[ORDERS[order]], tuple(place)))
+        return results

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.named_results.design_frames import DesignFrames
+from planar.batch.named_results.design_frames import DesignFrames, pair_arguments, solve_own_coordinates
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
 from planar.derivatives.transmission_system import can_drive, force_point, loaded_output, output_angle, undriven_output
 from planar.dynamics.external_actions import KinematicArrays
@@ -23,7 +23,7 @@ from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Jet, Scalar
+from planar.foundation.jets import Jet
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.output_pair import find_output_pair
@@ -68,29 +68,28 @@ def position_chunks(
         if not steps.size:
             continue
         designs = columns + first
-        places = steps, designs
         if size == 1:
             changed = with_design_values(mechanism, values_of_design(values, first))
         else:
-            changed = with_design_values(mechanism, {name: np.asarray(each)[designs] for name, each in values.items()})
+            changed = with_design_values(
+                mechanism, {name: np.asarray(value)[designs] for name, value in values.items()}
+            )
+        shapes, places = shapes_of_links(changed), (steps, designs)
+        selected = {link: _select_frame(frame, places) for link, frame in all_frames.items()}
         own = {
-            pair.name: tuple(_select(coordinate, places) for coordinate in frames.own_coordinates(pair))
-            for pair in frames.mechanism.pairs
+            pair.name: tuple(solve_own_coordinates(pair, *pair_arguments(pair, selected, shapes)))
+            for pair in changed.pairs
             if pair.coordinate_kinds
         }
-        selected = {link: _select_frame(frame, places) for link, frame in all_frames.items()}
-        yield DesignPositions(changed, selected, own, shapes_of_links(changed), designs, steps)
+        yield DesignPositions(changed, selected, own, shapes, designs, steps)
 
 
 def _select_frame(frame: Frame, places: tuple[IntArray, IntArray]) -> Frame:
+    """A frame at some places of its arrays."""
     if frame.fixed:
         return frame
-    x, y, cosine, sine, angle = (_select(part, places) for part in frame[:5])
+    x, y, cosine, sine, angle = (Jet(*(rate[places] for rate in part.parts)) for part in frame[:5])
     return Frame(x, y, cosine, sine, angle)
-
-
-def _select(value: Scalar, places: tuple[IntArray, IntArray]) -> Jet:
-    return Jet(*(np.broadcast_to(part, np.shape(value.parts[0]))[places] for part in value.parts))
 
 
 def _one_by_one(mechanism: Mechanism, values: Mapping[str, Array]) -> bool:

@@ -54,12 +54,8 @@ class DesignFrames:
             angles[link] = np.concatenate([angle[:1], angle[:1] + np.cumsum(turned, axis=0)])
         self.design_shape = next(iter(angles.values())).shape
         "(steps + 1, designs)"
-        self._set_angles(self._with_counted_turns(angles))
-
-    def _set_angles(self, angles: Mapping[str, Array]) -> None:
-        self.angles = dict(angles)
+        self.angles = self._with_counted_turns(angles)
         self._frames: dict[str, Frame] = {self.mechanism.frame: GROUND}
-        self.own: dict[str, tuple[Jet | Array, ...]] = {}
 
     def angle(self, link: str) -> tuple[Array, ...]:
         """A link's angle with all its turns (steps + 1, designs), and rates where these are there."""
@@ -82,10 +78,9 @@ class DesignFrames:
 
     def replace_angles(self, designs: IntArray, angles: Mapping[str, Array]) -> None:
         """Take other angles (steps + 1, designs) of some designs, of which more is known."""
-        replaced = {link: angle.copy() for link, angle in self.angles.items()}
         for link, angle in angles.items():
-            replaced[link][:, designs] = angle
-        self._set_angles(replaced)
+            self.angles[link][:, designs] = angle
+        self._frames = {self.mechanism.frame: GROUND}
         self.is_clear[designs] = True
 
     def _with_counted_turns(self, angles: dict[str, Array]) -> dict[str, Array]:
@@ -129,22 +124,11 @@ class DesignFrames:
         inputs, pairs = self._turn_ties()
         gaps = [pair.input_position_at(self.shapes, frames, {}) - self.inputs[pair.name][0] for pair in inputs]
         for pair in pairs:
-            arguments = self._pair_arguments(pair, frames)
+            arguments = pair_arguments(pair, frames, self.shapes)
             residual = pair.residual(*arguments, solve_own_coordinates(pair, *arguments))
             (row,) = set(range(len(residual))).difference(_rows_without_turns(pair))
             gaps.append(residual[row])
         return np.stack([np.broadcast_to(gap, self.design_shape[1:]) for gap in gaps], axis=-1)
-
-    def _pair_arguments(self, pair: Pair, frames: Mapping[str, Frame]) -> tuple[list[Frame], list[Scalar]]:
-        """The frames and the numbers that the formulas of a pair take."""
-        return [frames[link] for link in pair.bodies], [*pair.measure([self.shapes[link] for link in pair.bodies])]
-
-    def own_coordinates(self, pair: Pair) -> tuple[Jet | Array, ...]:
-        """The own coordinates of a pair."""
-        if pair.coordinate_kinds and pair.name not in self.own:
-            frames = {link: self.frame(link) for link in pair.bodies}
-            self.own[pair.name] = tuple(solve_own_coordinates(pair, *self._pair_arguments(pair, frames)))
-        return self.own.get(pair.name, ())
 
     def link_angle(self, name: str) -> tuple[Array, ...]:
         """A link's angle (steps + 1, designs), with its rates where these are there, as `Motion.link` tells it."""
@@ -158,7 +142,8 @@ class DesignFrames:
         turns that `Motion.pair` tells it with."""
         pair = self.motions[name]
         frames = {link: self.frame(link) for link in pair.bodies}
-        position = pair.input_position_at(self.shapes, frames, {name: self.own_coordinates(pair)})
+        own = solve_own_coordinates(pair, *pair_arguments(pair, frames, self.shapes))
+        position = pair.input_position_at(self.shapes, frames, {name: own})
         value, *rates = position.parts if isinstance(position, Jet) else (position,)
         if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.issuperset(pair.links):
             start = self.inputs[name][0] if name in self.inputs else np.zeros(value.shape[1:])
@@ -173,6 +158,13 @@ class DesignFrames:
 def _jet(*parts: Array) -> Jet | Array:
     """A jet of value and rates; a value that has none by itself."""
     return Jet(*parts) if len(parts) > 1 else parts[0]
+
+
+def pair_arguments(
+    pair: Pair, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]
+) -> tuple[list[Frame], list[Scalar]]:
+    """The frames and the numbers that the formulas of a pair take."""
+    return [frames[link] for link in pair.bodies], [*pair.measure([shapes[link] for link in pair.bodies])]
 
 
 def solve_own_coordinates(pair: Pair, frames: Sequence[Frame], numbers: Sequence[Scalar]) -> list[Scalar]:

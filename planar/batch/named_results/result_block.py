@@ -122,10 +122,9 @@ class _ResultBlockSolver:
 
     def _write_marched(self, slopes: Array, is_missing: BoolArray, out: Array) -> None:
         """Write the derivatives into the last rows of out: those that machine code tells, and what it leaves open."""
-        assert self.slopes is not None
         count = sum(row.width for row in self.rows if row.quantity == "derivatives")
         slope_rows = out[:, out.shape[1] - count :]
-        self.slopes.write_free(slopes, slope_rows)
+        slope_rows[:] = slopes
         designs = np.flatnonzero(is_missing.any(axis=0))
         if designs.size:
             block = self.block.select(designs)._replace(points=())
@@ -138,22 +137,22 @@ class _ResultBlockSolver:
 
     def _refinement(self) -> int:
         """Into how many a step is divided, so that it shows how far links turn."""
-        block, base_ = self.block, self.reference
+        block, reference = self.block, self.reference
         if block.duration is not None:
             timed = input_motions(self.mechanism, block, block.time)[0]
-            moved = np.abs(np.diff(timed, axis=1)) / base_.input_scale[:, None, None]
+            moved = np.abs(np.diff(timed, axis=1)) / reference.input_scale[:, None, None]
             return max(1, ceil(float(np.max(moved)) / LONGEST_STEP - 1e-9))
-        if base_.is_sliding and block.stop is None:
+        if reference.is_sliding and block.stop is None:
             return ceil(LEAST_STROKE_STEPS / block.steps)
-        inputs = base_.design_rows(block.designs, self.design_count).u
-        scale = float(base_.input_scale[base_.running_index])
-        start = inputs[base_.running_index] if block.start is None else block.start / scale
+        inputs = reference.design_rows(block.designs, self.design_count).u
+        scale = float(reference.input_scale[reference.running_index])
+        start = inputs[reference.running_index] if block.start is None else block.start / scale
         length = FULL_TURN if block.stop is None else block.stop / scale - start
         return max(1, ceil(float(np.max(np.abs(length))) / block.steps / LONGEST_STEP - 1e-9))
 
     def _frames(self, part: _SolvedPart, rows: Array) -> DesignFrames:
         """Frames of the links out of rows (orders, steps + 1, rows, designs) of places."""
-        base_, shape = self.reference, (rows.shape[1], rows.shape[3])
+        reference, shape = self.reference, (rows.shape[1], rows.shape[3])
         designs = with_design_values(self.mechanism, part.block.designs)
         if self.block.duration is not None:
             timed = input_motions(self.mechanism, part.block, part.input)[0]
@@ -162,7 +161,7 @@ class _ResultBlockSolver:
             running = np.broadcast_to(part.input, shape[::-1]).T
             inputs = {
                 driven.pair: running
-                if driven.pair == base_.pair
+                if driven.pair == reference.pair
                 else np.broadcast_to(np.asarray(driven.position, dtype=float), shape)
                 for driven in designs.inputs
             }
@@ -171,7 +170,7 @@ class _ResultBlockSolver:
             for k, link in enumerate(self.links)
         }
         time = None if self.block.duration is None else part.input
-        shapes = base_.design_rows(part.block.designs, shape[1]).shapes
+        shapes = reference.design_rows(part.block.designs, shape[1]).shapes
         return DesignFrames(designs, shapes, inputs, places, self.arm, time)
 
     def _look_up_angles(self, frames: DesignFrames, part: _SolvedPart, designs: IntArray) -> None:
@@ -213,7 +212,10 @@ class _ResultBlockSolver:
         for name in self.results.outputs:
             arrays["transmission_angle", name][0] = output_link(self.mechanism, name).angles(frames, values, is_solved)
         if self.slopes is not None and not self.marches_slopes:
-            is_asked = is_solved & self._slope_positions(part.which, refined)
+            is_asked = np.zeros_like(is_solved)  # not between the positions of the sweep
+            is_asked[::refined] = is_solved[::refined]
+            if self.slopes_at is not None:
+                is_asked[::refined] &= self.slopes_at[:, part.designs]
             self.slopes.find(frames, values, is_asked, arrays)
         first = 0
         for row in rows:
@@ -221,17 +223,11 @@ class _ResultBlockSolver:
             out[:, first : first + row.width] = np.moveaxis(array, 0, 1)[::refined]
             first += row.width
 
-    def _slope_positions(self, designs: slice, refined: int) -> BoolArray:
-        """Where derivatives are wanted (steps + 1, designs): not between the positions that are told."""
-        is_wanted = np.zeros((self.block.steps * refined + 1, self.design_count), dtype=bool)
-        is_wanted[::refined] = True if self.slopes_at is None else self.slopes_at
-        return is_wanted[:, designs]
-
 
 class _SolvedPart(NamedTuple):
     """Some designs of a block that has been solved: which, and their numbers, statuses and inputs."""
 
-    which: slice
+    designs: slice
     block: DesignBlock
     status: Array
     input: Array

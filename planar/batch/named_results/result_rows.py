@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
-from planar.foundation.arrays import Array
+import numpy as np
+
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, suggest_name
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -25,6 +27,14 @@ class ResultRow(NamedTuple):
     name: str
     width: int
     unit: str
+
+
+class DerivedKind(NamedTuple):
+    """Results that have derivatives: their quantities by order, the names, and how many numbers each result has."""
+
+    quantities: tuple[str, ...]
+    names: tuple[str, ...]
+    width: int
 
 
 class RequestedResults(NamedTuple):
@@ -64,15 +74,27 @@ class RequestedResults(NamedTuple):
         for name in self.reactions:
             yield ResultRow("reaction_couple", name, 1, "N m")
         if self.derivatives:
-            yield from self._derivative_rows(mechanism, orders)
+            yield from self._derivative_rows(orders)
 
-    def _derivative_rows(self, mechanism: Mechanism, orders: int) -> Iterator[ResultRow]:
-        of_kinds = (
-            (POINT_QUANTITIES, self.derived_points, 2),
-            (LINK_QUANTITIES, self.links, 1),
-            (PAIR_QUANTITIES, self.pairs, 1),
+    @property
+    def derived(self) -> tuple[DerivedKind, ...]:
+        """The derived results of points, links and pairs."""
+        return (
+            DerivedKind(POINT_QUANTITIES, self.derived_points, 2),
+            DerivedKind(LINK_QUANTITIES, self.links, 1),
+            DerivedKind(PAIR_QUANTITIES, self.pairs, 1),
         )
-        for quantities, names, width in of_kinds:
+
+    def number_of_row(self, rates: bool) -> IntArray:
+        """The index of the number of the file that each row of derivatives belongs to (rows,)."""
+        numbers = np.arange(len(self.derivatives))
+        orders = 3 if rates else 1
+        return np.concatenate(
+            [np.tile(np.repeat(numbers, width), orders * len(names)) for _, names, width in self.derived]
+        )
+
+    def _derivative_rows(self, orders: int) -> Iterator[ResultRow]:
+        for quantities, names, width in self.derived:
             for quantity in quantities[:orders]:
                 for name in names:
                     for number in self.derivatives:

@@ -140,7 +140,7 @@ def _transmission_systems(mechanism: Mechanism, transmissions: Sequence[Transmis
         pair = find_output_pair(mechanism, output.pair)[1]
         balance = OutputBalance(design, pair)
         forces = (balance.force_on(name, output.link) for name in output.through)
-        angle = output_angle(design.motion, (output.link, pair), output.through, forces)
+        angle = output_angle(design.positions, (output.link, pair), output.through, forces)
         yield LinearSystem(design, balance.acting, balance.unknowns, angle)
 
 
@@ -160,7 +160,7 @@ class RegionRows:
     def _places(self) -> tuple[BufferedFunction, BufferedFunction]:
         """(y, x) -> places of all points (x and y of each in turn), and the same with their Jacobians in y and x."""
         design = design_equations(self.mechanism)
-        frames, _ = design.placed
+        frames = design.positions.frames
         parts = []
         for point in self.points:
             link, at = point.members[0]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.derivatives.parameters import design_dimensions
+from planar.derivatives.kinematic_slopes import design_dimensions
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import Dimension
 from planar.foundation.arrays import Array

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.derivatives.kinematic_slopes import NamedResult, RatedMotion
+from planar.derivatives.kinematic_slopes import CoordinateMotion, NamedResult
 from planar.derivatives.result_slopes import DerivedResults, PositionSlopes, SlopeSystem, tied_dimensions
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array
@@ -19,7 +19,7 @@ from planar.results.motion import Motion
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath, WantedPoses
 
 
-def wanted_parts(mechanism: Mechanism, motion: RatedMotion, wanted: Wanted) -> list[Scalar]:
+def wanted_parts(mechanism: Mechanism, motion: CoordinateMotion, wanted: Wanted) -> list[Scalar]:
     """The parts of a wanted item, SI, in any arithmetic: of a point x and y, of a link those of its origin and its
     angle, of a pair its position."""
     if isinstance(wanted, WantedPath):
@@ -41,7 +41,7 @@ def wanted_parts(mechanism: Mechanism, motion: RatedMotion, wanted: Wanted) -> l
 
 def wanted_expression(design: DesignEquations, wanted: Wanted) -> ca.SX:
     """The parts (parts,) of a wanted item in the unknowns and numbers of a design."""
-    return stack_expressions(wanted_parts(design.mechanism, design.motion, wanted))
+    return stack_expressions(wanted_parts(design.mechanism, design.positions, wanted))
 
 
 def wanted_slopes(moving: Motion, wanted: Iterable[Wanted]) -> tuple[SlopeSystem, DerivedResults]:
