@@ -143,7 +143,7 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
             begin, end, by = index.indices(len(self))
             if by != 1:
                 raise BadInput("linkages", "linkages that follow one another are wanted")
-            return self._part(begin, max(begin, end))
+            return self if end - begin == len(self) else self._part(begin, max(begin, end))
         if not -len(self) <= index < len(self):
             raise IndexError(f"there are {len(self)} linkages, and no number {index}")
         own = self._part(index % len(self), index % len(self) + 1)

@@ -288,9 +288,9 @@ def test_reductions_rounded_and_elsewhere(pool):
 
 
 def test_mechanisms_are_taken_as_they_are_needed_and_only_reductions_are_kept(monkeypatch):
-    from planar.batch.mechanisms import parts
+    from planar.batch import sweep_mechanisms
 
-    monkeypatch.setattr(parts, "PART_SIZE", 4)
+    monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 4)
     taken, told = [], []
 
     def mechanisms():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any
 
@@ -41,9 +41,8 @@ from planar.batch.mechanisms.tape_runs import (
     TABLE_COS,
     TABLE_SIN,
     BlockKinds,
-    FineRun,
+    Endings,
     LinkageEnding,
-    PartRun,
     TapedLinkages,
     run_taped_linkages,
 )
@@ -62,7 +61,9 @@ INPUT_NUMBERS = 5
 """Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
 
 
-def run_blocks(arrays: LinkageArrays, points: PointTable, values: Array, run: PartRun, request: SweepRequest) -> None:
+def run_blocks(
+    arrays: LinkageArrays, points: PointTable, values: Array, endings: Endings, request: SweepRequest
+) -> None:
     """Run linkages block after block; `points` says which are results, and their rows in values.
 
     Behind these rows are those of the points of links that decide where pairs with stops are.
@@ -80,38 +81,43 @@ def run_blocks(arrays: LinkageArrays, points: PointTable, values: Array, run: Pa
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
     }
     kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
-    run_taped_linkages(taped, kinds, values, request.steps, run, find_endings)
-    is_dead = run.is_decided & (run.outcome == DEAD_POINT_NUMBER)
-    for k in np.flatnonzero(is_dead[arrays.which]).tolist():
-        number = int(arrays.which[k])
-        links = arrays.links_of_block(int(run.block[number]))
-        run.reasons[number] = dead_point_reason(links, arrays.start[k] + run.near[number])
+    run_taped_linkages(taped, kinds, values, request.steps, endings, find_endings)
+    is_dead = (endings.solved >= 0) & (endings.outcome == DEAD_POINT_NUMBER)
+    for number in arrays.which[is_dead[arrays.which]].tolist():
+        links = arrays.links_of_block(int(endings.links[number, 0]))
+        endings.reasons[number] = dead_point_reason(links, endings.start[number] + endings.near[number])
 
 
 def _find_ending(
-    arrays: LinkageArrays, k: int, rows: IntArray, running_pair: str | None, run: FineRun
+    arrays: LinkageArrays,
+    k: int,
+    rows: IntArray,
+    running_pair: str | None,
+    rotation: Array,
+    point_places: Callable[[IntArray], Array],
+    good: int,
 ) -> LinkageEnding | None:
     """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
     sure."""
     mechanism, unit = arrays.mechanisms[k], float(arrays.unit[k])
     stops, counted = PairStops(mechanism, unit), links_counting_turns(mechanism)
-    u = {given.pair: np.full((run.good, 1), given.position) for given in mechanism.inputs}
+    u = {given.pair: np.full((good, 1), given.position) for given in mechanism.inputs}
     is_long = stops.high - stops.low > TURN + SURE_DISTANCE
     if any(
         not counted.isdisjoint(pair.bodies) or (pair_is_long and pair.name not in u)
         for pair, pair_is_long in zip(stops.pairs, is_long.tolist(), strict=True)
     ):
         return None
-    positions = arrays.start[k] + run.rotation
-    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[: run.good, None]
-    places = np.moveaxis(run.places(rows)[..., : run.good], 1, 2)[:, None, :, :, None]
+    positions = arrays.start[k] + rotation
+    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[:good, None]
+    places = np.moveaxis(point_places(rows)[..., :good], 1, 2)[:, None, :, :, None]
     points = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
     frames = DesignFrames(mechanism, shapes_of_links(mechanism), u, points, unit)
     if not frames.is_clear[0]:
         return None
     values = np.array([frames.pair_value(pair.name)[0][:, 0] for pair in stops.pairs])
     ending = _find_first_stop(stops, values, np.array([angle[:, 0] for angle in frames.angles.values()]))
-    if ending is None or (ending.outcome is Outcome.SOLVED and run.good < len(positions)):
+    if ending is None or (ending.outcome is Outcome.SOLVED and good < len(positions)):
         return None  # beside a dead point it is not clear which comes first
     if ending.outcome is Outcome.SOLVED:
         return ending
@@ -154,7 +160,7 @@ def _make_tape(
     at_input, at_block, at_point = np.split(position, np.cumsum([len(owner) for owner in owners])[:-1])
     slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
     p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in block_numbers))))
-    kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
+    kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full((first[-1], 2), -1)
     kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
     p[at_input, :INPUT_NUMBERS] = np.stack(
         [inputs.value, *inputs.cos_and_sin(), inputs.velocity, inputs.acceleration], axis=1
@@ -162,7 +168,7 @@ def _make_tape(
     slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), rows
-    blocks[at_block] = np.arange(arrays.block_count)
+    blocks[at_block] = np.arange(arrays.block_count)[:, None]
     for number, (batch, values) in enumerate(zip(arrays.batches, block_numbers, strict=True)):
         indices, kind = at_block[batch.block_numbers], batch.block_type
         kinds[indices] = FIRST_BLOCK_TYPE + number

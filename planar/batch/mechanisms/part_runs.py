@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from planar.batch.general_path import solve_design
+from planar.batch.general_path import SolvedDesign, solve_design
 from planar.batch.mechanisms.block_runs import run_blocks
 from planar.batch.mechanisms.linkages import LinkageArrays, SweepRequest, make_linkage_arrays
 from planar.batch.mechanisms.pins import pin_tape, result_pins, run_pins
-from planar.batch.mechanisms.results import Endings, PointTable, Swept, SweptPart
-from planar.batch.mechanisms.tape_runs import DEAD_POINT_NUMBER, FULL_TURN, PartRun, clear_points, make_values
+from planar.batch.mechanisms.results import PointTable, SweptPart
+from planar.batch.mechanisms.tape_runs import DEAD_POINT_NUMBER, FULL_TURN, Endings, clear_points, make_values
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
@@ -38,7 +38,11 @@ def solve_part(
     with take_turn():
         if dtype == "float64":
             return _solve(mechanisms, request, values, uses_general_path)
-        return _solve(mechanisms, request, None, uses_general_path).astype(dtype, values)
+        part = _solve(mechanisms, request, None, uses_general_path)
+        values = np.empty(part.values.shape, dtype) if values is None else values
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers behind the last step are arbitrary
+            values[...] = part.values
+        return replace(part, values=values)
 
 
 def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
@@ -47,7 +51,7 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
     pins = None
     if linkages is not None:
         pins = result_pins(linkages, request.points)
-        is_open[numbers[pin_tape(linkages).linkages.which]] = False
+        is_open[numbers[pin_tape(linkages).which]] = False
     arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, request.pair)
     if pins is not None and len(numbers) == len(mechanisms):
         points = pins
@@ -57,32 +61,29 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
         watched_count = 0 if arrays is None else len(arrays.watched_points.owner)
         values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
 
-    run = PartRun.undecided(len(mechanisms))
-    bars = np.zeros((len(mechanisms), 2), dtype=np.int64)
-    start = np.zeros(len(mechanisms))
+    endings = Endings.undecided(len(mechanisms))
     if linkages is not None and pins is not None:
         rows = np.arange(len(pins.codes)) + np.repeat(points.first[numbers] - pins.first[:-1], np.diff(pins.first))
-        run_pins(linkages, numbers, pins, rows, values, run, request.steps)
-        tape, start[numbers] = pin_tape(linkages), linkages.crank_angles
-        which = tape.linkages.which
-        bars[numbers[which]] = tape.bars[run.block[numbers[which]]] - linkages.first_bar[which, None]
+        endings.start[numbers] = linkages.crank_angles
+        run_pins(linkages, numbers, pins, rows, values, endings, request.steps)
     if arrays is not None:
-        run_blocks(arrays, points, values, run, request)
-        start[arrays.which] = arrays.start
+        endings.start[arrays.which] = arrays.start
+        run_blocks(arrays, points, values, endings, request)
 
-    undecided = np.flatnonzero(~run.is_decided)
-    run.solved[undecided], run.outcome[undecided] = 0, DEAD_POINT_NUMBER
-    stopped = np.flatnonzero(run.solved <= request.steps)
-    clear_points(values, points.first, stopped, run.solved[stopped])
-    general = {}
+    undecided = np.flatnonzero(endings.solved < 0)
+    endings.solved[undecided], endings.outcome[undecided] = 0, DEAD_POINT_NUMBER
+    stopped = np.flatnonzero(endings.solved <= request.steps)
+    clear_points(values, points.first, stopped, endings.solved[stopped])
     for k in undecided.tolist() if uses_general_path else ():
-        general[k] = swept = _solve_by_general_path(mechanisms[k], points.names(k), request)
-        orders = [order for order in (swept.position, swept.velocity, swept.acceleration) if order is not None]
-        for row, name in enumerate(points.names(k), points.first[k]):
-            for order, of_points in enumerate(orders):
-                values[row, 2 * order : 2 * order + 2, : request.steps + 1] = of_points[name].T
-    endings = Endings(start, run.solved, run.outcome, bars, run.near, run.reasons)
-    return SweptPart(values[: points.first[-1]], request.steps, points, endings, general)
+        names = points.names(k)
+        solved = _solve_by_general_path(mechanisms[k], names, request)
+        endings.solved[k], endings.outcome[k] = np.count_nonzero(solved.status == 0), solved.status[-1]
+        endings.general_inputs[k] = solved.input
+        endings.reasons[k] = str(solved.message or solved.rate_remark)
+        target = values[points.first[k] : points.first[k + 1], :, : request.steps + 1]
+        by_order = solved.out.reshape(request.steps + 1, target.shape[1] // 2, len(names), 2)
+        target[:] = by_order.transpose(2, 1, 3, 0).reshape(target.shape)
+    return SweptPart(values[: points.first[-1]], request.steps, points, endings)
 
 
 def _pinned_linkages(mechanisms: Mechanisms, request: SweepRequest) -> tuple[IntArray, PinnedLinkages | None]:
@@ -136,8 +137,8 @@ def _result_points(mechanism: Mechanism, points: Sequence[str] | None) -> list[s
     return [name for name in links if mechanism.frame not in links[name]]
 
 
-def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> Swept:
-    """One mechanism as a cycle of its own."""
+def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> SolvedDesign:
+    """One mechanism as a separate cycle."""
     running = running_input_index(mechanism, request.pair, "inputs")
     inputs = tuple(
         given._replace(law=None) if k == running else given._replace(velocity=0.0, acceleration=0.0, law=None)
@@ -148,9 +149,4 @@ def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: 
     if relative_motions(mechanism)[pair].input_kind is not MeasureKind.LENGTH:
         grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
     ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
-    solved = solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)
-    orders = solved.out.reshape(request.steps + 1, 3 if request.rates else 1, len(names), 2)
-    by_name = [{name: orders[:, k, i] for i, name in enumerate(names)} for k in range(orders.shape[1])]
-    position, velocity, acceleration = by_name if request.rates else (by_name[0], None, None)
-    reason = str(solved.message or solved.rate_remark)
-    return Swept(position, velocity, acceleration, solved.input, solved.status, reason, True)
+    return solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)

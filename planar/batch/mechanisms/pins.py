@@ -22,7 +22,7 @@ from planar.batch.mechanisms.tape_runs import (
     TABLE_COS,
     TABLE_SIN,
     BlockKinds,
-    PartRun,
+    Endings,
     TapedLinkages,
     run_taped_linkages,
 )
@@ -173,17 +173,6 @@ SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
 """m: squares and products of lengths between these are numbers."""
 
 
-class PinTape(NamedTuple):
-    """The linkages that consist of a crank and dyads as a tape of steps, see `PinStep`.
-
-    Slots are the two pins that a step takes and the one that it places, `bars` (steps, 2) those that it uses. Pins and
-    bars are numbered through all linkages.
-    """
-
-    linkages: TapedLinkages
-    bars: IntArray
-
-
 class _Steps(NamedTuple):
     """Steps, level after level: their kinds, the two given pins, the one that is placed, the two bars."""
 
@@ -195,9 +184,9 @@ class _Steps(NamedTuple):
     two: IntArray
 
 
-def _make_tape(linkages: PinnedLinkages) -> PinTape:
+def _make_tape(linkages: PinnedLinkages) -> TapedLinkages:
     """Make the tape of the linkages that consist of a crank and dyads, if their assembly is surely that of their pins'
-    places."""
+    places. Slots are the two pins that a step takes and the one that it places, numbered through all linkages."""
     count, bar_counts = len(linkages), np.diff(linkages.first_bar)
     bar_owner = np.repeat(np.arange(count), bar_counts)
     pin_owner = np.repeat(np.arange(count), np.diff(linkages.first_pin))
@@ -226,8 +215,8 @@ def _make_tape(linkages: PinnedLinkages) -> PinTape:
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
     clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
-    blocks = np.arange(len(order))
-    return PinTape(TapedLinkages(which, first, steps.kinds[order], slots, p[order], blocks, tolerance, clearance), bars)
+    bars -= linkages.first_bar[owner[order], None]
+    return TapedLinkages(which, first, steps.kinds[order], slots, p[order], bars, tolerance, clearance)
 
 
 def _find_steps(
@@ -369,11 +358,11 @@ def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
 
 
-_tapes: WeakKeyDictionary[PinnedLinkages, PinTape] = WeakKeyDictionary()
+_tapes: WeakKeyDictionary[PinnedLinkages, TapedLinkages] = WeakKeyDictionary()
 """The tapes of linkages, as long as the linkages are kept."""
 
 
-def pin_tape(linkages: PinnedLinkages) -> PinTape:
+def pin_tape(linkages: PinnedLinkages) -> TapedLinkages:
     """The tape of linkages, made once."""
     tape = _tapes.get(linkages)
     if tape is None:
@@ -387,7 +376,7 @@ def run_pins(
     points: PointTable,
     rows: IntArray,
     values: Array,
-    run: PartRun,
+    endings: Endings,
     steps: int,
 ) -> None:
     """Run the linkages that have a tape; `numbers` (linkages,) are those in the part.
@@ -395,7 +384,7 @@ def run_pins(
     `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
     that linkages share.
     """
-    taped, rates = pin_tape(linkages).linkages, values.shape[1] == POINT_ROWS[True]
+    taped, rates = pin_tape(linkages), values.shape[1] == POINT_ROWS[True]
     slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
     slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
     pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
@@ -406,7 +395,7 @@ def run_pins(
     kinds = BlockKinds(
         lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
     )
-    run_taped_linkages(taped, kinds, values, steps, run)
+    run_taped_linkages(taped, kinds, values, steps, endings)
     is_fixed = np.zeros(len(linkages.positions), dtype=bool)
     is_fixed[frame_pins(linkages)] = True
     is_fixed_point = is_fixed[pins]

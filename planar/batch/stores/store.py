@@ -16,7 +16,7 @@ import numpy as np
 from planar.batch.assembly.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedResults, ResultRow
-from planar.batch.results import Sweep, SweepNotes
+from planar.batch.results import Sweep, SweepNotes, add_ending_counts
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.document.files import to_dict
 from planar.foundation.arrays import Array, part_offsets
@@ -139,12 +139,9 @@ class BlockStore(ABC):
     def notes(self) -> SweepNotes:
         """What there is to say, in the order of the designs, whichever block was solved first."""
         notes = [note for _, note in sorted(self.block_notes.items())]
-        ended: dict[int, tuple[int, Any]] = {}
-        for _, _, block_endings in notes:
-            for code, count, sentence in block_endings:
-                previous, first = ended.get(code, (0, sentence))
-                ended[code] = previous + count, first
-        endings = tuple((code, *ending) for code, ending in sorted(ended.items()))
+        endings = tuple(
+            (code, *ending) for code, ending in sorted(add_ending_counts(note[2] for note in notes).items())
+        )
         general_designs, plan = sum(note[1] for note in notes), self.plan
         counts = plan.design_count, general_designs, self.general_positions
         return SweepNotes(*counts, endings, plan.block_count, len(self.damaged))
