@@ -26,7 +26,7 @@ from planar.batch.mechanisms.block_type import (
     Y,
     write_formula,
 )
-from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, find_linkage_assemblies
+from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, LinkageAssemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, PointArrays, SweepRequest, watched_links
 from planar.batch.mechanisms.newton_march import compile_newton_block, step_table
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
@@ -62,20 +62,25 @@ INPUT_NUMBERS = 5
 
 
 def run_blocks(
-    arrays: LinkageArrays, points: PointTable, values: Array, endings: Endings, request: SweepRequest
+    arrays: LinkageArrays,
+    assemblies: LinkageAssemblies,
+    points: PointTable,
+    values: Array,
+    endings: Endings,
+    request: SweepRequest,
 ) -> None:
     """Run linkages block after block; `points` says which are results, and their rows in values.
 
     Behind these rows are those of the points of links that decide where pairs with stops are.
     """
-    is_sure, block_numbers = find_linkage_assemblies(arrays)
     results = arrays.points([points.names(k) for k in arrays.which.tolist()])
     first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
     rows = np.arange(len(results.owner)) + (points.first[arrays.which] - first_result[:-1])[results.owner]
     watched = arrays.watched_points
     first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
     rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
-    taped = _make_tape(arrays, block_numbers, results.followed_by(watched), rows).select(np.flatnonzero(is_sure))
+    taped = _make_tape(arrays, assemblies.block_numbers, results.followed_by(watched), rows)
+    taped = taped.select(np.flatnonzero(assemblies.is_sure))
     find_endings = {
         int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()

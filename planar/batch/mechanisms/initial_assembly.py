@@ -28,9 +28,17 @@ LEAST_SPREAD = 1e-12
 """Squared sizes: points of a link that are nearer to each other define no angle."""
 
 
-def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Array]]:
-    """Whether the assembly of each linkage is surely the one that a search of the mechanism returns (linkages,), and
-    of every batch the numbers of its blocks for the run: p, then signs or unknowns (blocks, numbers).
+class LinkageAssemblies(NamedTuple):
+    """Assemblies of linkages: whether that of each is surely the one that a search of the mechanism returns
+    (linkages,), and of every batch the numbers of its blocks for the run: p, then signs or unknowns (blocks,
+    numbers)."""
+
+    is_sure: BoolArray
+    block_numbers: list[Array]
+
+
+def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
+    """Find the assemblies of linkages nearest to their sketches.
 
     An assembly mode of a block is accepted if every other mode is farther from the sketch by more than the distance of
     all blocks of the linkage together: every other choice gives a larger total distance. Newton's method solves blocks
@@ -70,7 +78,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Ar
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     if np.any(clearance > LEAST_CLEARANCE):
         is_sure &= starts.run(clearance)
-    return is_sure, block_numbers
+    return LinkageAssemblies(is_sure, block_numbers)
 
 
 JUDGED_ROWS = 4

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.batch.general_path import SolvedDesign, solve_design
 from planar.batch.mechanisms.block_runs import run_blocks
+from planar.batch.mechanisms.initial_assembly import LinkageAssemblies, find_linkage_assemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, SweepRequest, make_linkage_arrays
-from planar.batch.mechanisms.pins import pin_tape, result_pins, run_pins
+from planar.batch.mechanisms.pins import make_pin_tape, result_pins, run_pins
 from planar.batch.mechanisms.results import PointTable, SweptPart
-from planar.batch.mechanisms.tape_runs import DEAD_POINT_NUMBER, FULL_TURN, Endings, clear_points, make_values
+from planar.batch.mechanisms.tape_runs import (
+    DEAD_POINT_NUMBER,
+    FULL_TURN,
+    Endings,
+    TapedLinkages,
+    clear_points,
+    make_values,
+)
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
@@ -45,30 +54,68 @@ def solve_part(
         return replace(part, values=values)
 
 
-def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
-    numbers, linkages = _pinned_linkages(mechanisms, request)
+class _PreparedPart(NamedTuple):
+    """What is known of the mechanisms of a part before they run: the numbers of those that are pinned bars, these as
+    arrays, and the tape of those that are solved pin by pin; those that are solved block by block, and their
+    assemblies."""
+
+    pinned: IntArray
+    linkages: PinnedLinkages | None
+    pin_tape: TapedLinkages | None
+    arrays: LinkageArrays | None
+    assemblies: LinkageAssemblies | None
+
+
+def _prepare(mechanisms: Mechanisms, pair: str | None) -> _PreparedPart:
+    """Prepare a part with the input that runs at `pair`, once for linkages that are arrays, or a mechanism alone."""
+    pinned, linkages, pin_tape, assemblies = np.arange(len(mechanisms)), None, None, None
+    owner: Any = mechanisms if isinstance(mechanisms, PinnedLinkages) else mechanisms[0]
+    prepared: dict[str | None, _PreparedPart] = {}
+    if isinstance(mechanisms, PinnedLinkages) or len(mechanisms) == 1:
+        prepared = owner.__dict__.setdefault("_prepared_parts", prepared)
+    if pair in prepared:
+        return prepared[pair]
+    if isinstance(mechanisms, PinnedLinkages):
+        linkages = mechanisms
+    else:
+        layouts = {
+            k: mechanism.layout
+            for k, mechanism in enumerate(mechanisms)
+            if isinstance(mechanism, PinnedMechanism) and mechanism.layout is not None and not mechanism.stops
+        }
+        pinned = np.array([] if pair is not None else list(layouts), dtype=np.int64)
+        if len(pinned):
+            linkages = PinnedLinkages.from_layouts(list(layouts.values()))
     is_open = np.ones(len(mechanisms), dtype=bool)
-    pins = None
     if linkages is not None:
-        pins = result_pins(linkages, request.points)
-        is_open[numbers[pin_tape(linkages).which]] = False
-    arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, request.pair)
-    if pins is not None and len(numbers) == len(mechanisms):
+        pin_tape = make_pin_tape(linkages)
+        is_open[pinned[pin_tape.which]] = False
+    arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, pair)
+    if arrays is not None:
+        assemblies = find_linkage_assemblies(arrays)
+    prepared[pair] = _PreparedPart(pinned, linkages, pin_tape, arrays, assemblies)
+    return prepared[pair]
+
+
+def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
+    pinned, linkages, pin_tape, arrays, assemblies = _prepare(mechanisms, request.pair)
+    pins = None if linkages is None else result_pins(linkages, request.points)
+    if pins is not None and len(pinned) == len(mechanisms):
         points = pins
     else:
-        points = _point_table(mechanisms, request, numbers, pins, arrays)
+        points = _point_table(mechanisms, request, pinned, pins, arrays)
     if values is None:
         watched_count = 0 if arrays is None else len(arrays.watched_points.owner)
         values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
 
     endings = Endings.undecided(len(mechanisms))
-    if linkages is not None and pins is not None:
-        rows = np.arange(len(pins.codes)) + np.repeat(points.first[numbers] - pins.first[:-1], np.diff(pins.first))
-        endings.start[numbers] = linkages.crank_angles
-        run_pins(linkages, numbers, pins, rows, values, endings, request.steps)
-    if arrays is not None:
+    if linkages is not None and pin_tape is not None and pins is not None:
+        rows = np.arange(len(pins.codes)) + np.repeat(points.first[pinned] - pins.first[:-1], np.diff(pins.first))
+        endings.start[pinned] = linkages.crank_angles
+        run_pins(linkages, pin_tape, pinned, pins, rows, values, endings, request.steps)
+    if arrays is not None and assemblies is not None:
         endings.start[arrays.which] = arrays.start
-        run_blocks(arrays, points, values, endings, request)
+        run_blocks(arrays, assemblies, points, values, endings, request)
 
     undecided = np.flatnonzero(endings.solved < 0)
     endings.solved[undecided], endings.outcome[undecided] = 0, DEAD_POINT_NUMBER
@@ -84,25 +131,6 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
         by_order = solved.out.reshape(request.steps + 1, target.shape[1] // 2, len(names), 2)
         target[:] = by_order.transpose(2, 1, 3, 0).reshape(target.shape)
     return SweptPart(values[: points.first[-1]], request.steps, points, endings)
-
-
-def _pinned_linkages(mechanisms: Mechanisms, request: SweepRequest) -> tuple[IntArray, PinnedLinkages | None]:
-    """Those of the mechanisms that are pinned bars, their numbers and as arrays."""
-    if isinstance(mechanisms, PinnedLinkages):
-        return np.arange(len(mechanisms)), mechanisms
-    layouts = {
-        k: each.layout
-        for k, each in enumerate(mechanisms)
-        if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None and not each.stops
-    }
-    if not layouts:
-        return np.arange(0), None
-    if len(mechanisms) > 1:
-        return np.array(list(layouts)), PinnedLinkages.from_layouts(list(layouts.values()))
-    cached = mechanisms[0].__dict__  # the tape of one linkage serves its next run
-    if "_linkages" not in cached:
-        cached["_linkages"] = PinnedLinkages.from_layouts(list(layouts.values()))
-    return np.arange(1), cached["_linkages"]
 
 
 def _point_table(

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from enum import IntEnum
 from functools import lru_cache, partial
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -184,7 +183,7 @@ class _Steps(NamedTuple):
     two: IntArray
 
 
-def _make_tape(linkages: PinnedLinkages) -> TapedLinkages:
+def make_pin_tape(linkages: PinnedLinkages) -> TapedLinkages:
     """Make the tape of the linkages that consist of a crank and dyads, if their assembly is surely that of their pins'
     places. Slots are the two pins that a step takes and the one that it places, numbered through all linkages."""
     count, bar_counts = len(linkages), np.diff(linkages.first_bar)
@@ -358,20 +357,9 @@ def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
 
 
-_tapes: WeakKeyDictionary[PinnedLinkages, TapedLinkages] = WeakKeyDictionary()
-"""The tapes of linkages, as long as the linkages are kept."""
-
-
-def pin_tape(linkages: PinnedLinkages) -> TapedLinkages:
-    """The tape of linkages, made once."""
-    tape = _tapes.get(linkages)
-    if tape is None:
-        tape = _tapes[linkages] = _make_tape(linkages)
-    return tape
-
-
 def run_pins(
     linkages: PinnedLinkages,
+    tape: TapedLinkages,
     numbers: IntArray,
     points: PointTable,
     rows: IntArray,
@@ -379,23 +367,23 @@ def run_pins(
     endings: Endings,
     steps: int,
 ) -> None:
-    """Run the linkages that have a tape; `numbers` (linkages,) are those in the part.
+    """Run the linkages on the tape, see `make_pin_tape`; `numbers` (linkages,) are those in the part.
 
     `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
     that linkages share.
     """
-    taped, rates = pin_tape(linkages), values.shape[1] == POINT_ROWS[True]
+    rates = values.shape[1] == POINT_ROWS[True]
     slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
     slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
     pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
     slots[pins] = rows
-    block_slots = slots[taped.slots]
-    block_slots[taped.kinds == PinStep.CRANK, 0] = TABLE
-    taped = taped._replace(which=numbers[taped.which], slots=block_slots)
+    block_slots = slots[tape.slots]
+    block_slots[tape.kinds == PinStep.CRANK, 0] = TABLE
+    tape = tape._replace(which=numbers[tape.which], slots=block_slots)
     kinds = BlockKinds(
         lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
     )
-    run_taped_linkages(taped, kinds, values, steps, endings)
+    run_taped_linkages(tape, kinds, values, steps, endings)
     is_fixed = np.zeros(len(linkages.positions), dtype=bool)
     is_fixed[frame_pins(linkages)] = True
     is_fixed_point = is_fixed[pins]
