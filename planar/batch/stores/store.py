@@ -32,6 +32,9 @@ STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
 POINT_UNITS = ("m", "m/s", "m/s^2")
 RowValue = TypeVar("RowValue")
+BlockNote = tuple[int, int, Any]
+"""Of a block the positions and designs of the general path, and by the code of each outcome how many designs ended so,
+and the sentence of the first."""
 INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
 """What stands for that in a status."""
 
@@ -113,8 +116,7 @@ class BlockStore(ABC):
         self.finished: set[int] = set()
         self.damaged: set[int] = set()
         "blocks of which something was there already, but not whole"
-        self.block_notes: dict[int, tuple[int, int, Any]] = {}
-        "of every block: positions and designs of the general path, and what is said"
+        self.block_notes: dict[int, BlockNote] = {}
 
     def output_array(self, part: slice) -> Array | None:
         """Where a block may put its results, if that is known ahead: out (steps + 1, rows, designs)."""
@@ -227,6 +229,15 @@ class FolderStore(BlockStore):
         else:
             with reporting_write_errors(path):
                 self.write_about({"fingerprint": self.fingerprint, "block": plan.block_size})
+        with reporting_write_errors(path):
+            self.open_blocks()
+        for number in range(self.plan.block_count):
+            note, is_begun = self.inspect_block(number)
+            if note is not None:
+                self.finished.add(number)
+                self.block_notes[number] = note
+            elif is_begun:
+                self.damaged.add(number)
 
     @abstractmethod
     def read_about(self) -> Any:
@@ -235,6 +246,25 @@ class FolderStore(BlockStore):
     @abstractmethod
     def write_about(self, about: dict[str, Any]) -> None:
         """Begin the store with what it says about itself, so that it is this sweep's from its first moment."""
+
+    @abstractmethod
+    def open_blocks(self) -> None:
+        """Make what blocks are written to, or remove what a killed process has left."""
+
+    @abstractmethod
+    def inspect_block(self, number: int) -> tuple[BlockNote | None, bool]:
+        """The note of a block that is whole, else None; and whether anything of the block is there."""
+
+    @abstractmethod
+    def write_files(self, number: int, part: slice, done: SolvedDesigns, note: BlockNote) -> None:
+        """Write a solved block and its note."""
+
+    def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
+        endings = [(code, count, str(sentence)) for code, count, sentence in done.endings]
+        note = done.general_positions, done.general_designs, endings
+        with reporting_write_errors(self.path):
+            self.write_files(number, part, done, note)
+        self.block_notes[number] = note
 
     def block_slice(self, number: int) -> slice:
         """The designs of a block."""
