@@ -229,11 +229,11 @@ class RunGradients:
         begin = float(mechanism.inputs[self.reference.running_index].position) if start is None else float(start)
         length = 2.0 * np.pi if stop is None else stop - begin
         grid = begin + length * np.linspace(0.0, 1.0, len(self._positions))
-        result = run_design(mechanism, self.reference.pair, grid)
+        result = run_design(mechanism, self.reference.pair, grid, len(grid) - 1, (float(grid[0]), float(grid[-1])))
         status: IntArray = np.array(result.status)
         value, total = 0.0, np.zeros(len(self.names))
-        if result.motion is not None and result.many:
-            solved = slice(result.many)
+        if result.motion is not None and result.row_count:
+            solved = slice(result.row_count)
             coordinates = constraint_elements(mechanism).coordinates(result.motion)[: 3 if self.rates else 1]
             numbers = [value_at(mechanism, dimension.address) for dimension in self.parameters.dimensions]
             kinematics = KinematicSlopes(self.parameters, [order[solved] for order in coordinates], values=numbers)
