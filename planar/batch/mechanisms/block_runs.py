@@ -27,7 +27,7 @@ from planar.batch.mechanisms.block_type import (
     write_formula,
 )
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, LinkageAssemblies
-from planar.batch.mechanisms.linkages import LinkageArrays, PointArrays, SweepRequest, watched_links
+from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, SweepRequest, watched_links
 from planar.batch.mechanisms.newton_march import compile_newton_block, step_table
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
@@ -79,8 +79,12 @@ def run_blocks(
     watched = arrays.watched_points
     first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
     rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
-    taped = _make_tape(arrays, assemblies.block_numbers, results.followed_by(watched), rows)
-    taped = taped.select(np.flatnonzero(assemblies.is_sure))
+    tape_points = LinkArrays(
+        np.concatenate([results.owner, watched.owner]),
+        np.concatenate([results.link_index, watched.link_index]),
+        np.concatenate([results.numbers, watched.numbers]),
+    )
+    taped = _make_tape(arrays, assemblies.block_numbers, tape_points, rows).select(np.flatnonzero(assemblies.is_sure))
     find_endings = {
         int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
@@ -151,7 +155,7 @@ def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageE
 
 
 def _make_tape(
-    arrays: LinkageArrays, block_numbers: Sequence[Array], points: PointArrays, rows: IntArray
+    arrays: LinkageArrays, block_numbers: Sequence[Array], points: LinkArrays, rows: IntArray
 ) -> TapedLinkages:
     """The tape of all linkages: the inputs of a linkage, then its blocks, then its points, each to its row."""
     linkage_count, inputs = len(arrays), arrays.inputs
@@ -166,10 +170,8 @@ def _make_tape(
     slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
     p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in block_numbers))))
     kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full((first[-1], 2), -1)
-    kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
-    p[at_input, :INPUT_NUMBERS] = np.stack(
-        [inputs.value, *inputs.cos_and_sin(), inputs.velocity, inputs.acceleration], axis=1
-    )
+    kinds[at_input], kinds[at_point] = np.where(arrays.is_running, RUNNING_INPUT, STANDING_INPUT), POINT
+    p[at_input, :INPUT_NUMBERS] = inputs.numbers
     slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
     p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
     slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), rows

@@ -10,7 +10,7 @@ import numpy as np
 from planar.batch.assembly.assembly_scores import is_at_sketch, is_surely_farther
 from planar.batch.march.prediction import CLEAR_REGULARITY
 from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, SKETCH_SUMS, BlockType, X
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
 from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
 from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
@@ -78,6 +78,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     if np.any(clearance > LEAST_CLEARANCE):
         is_sure &= starts.run(clearance)
+    is_sure &= ~linkages.has_short_arm
     return LinkageAssemblies(is_sure, block_numbers)
 
 
@@ -96,43 +97,48 @@ class _Starts:
     """The blocks of linkages as a tape of one step, with the places of all links in a separate state."""
 
     def __init__(self, linkages: LinkageArrays):
-        self.linkages, blocks = linkages, linkages.block_count
+        self.linkages, batches, blocks, inputs = linkages, linkages.batches, linkages.block_count, linkages.inputs
         self.first = part_offsets(linkages.link_counts)
         self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
-        _fill_inputs(self.state, linkages, self.first)
+        self.state[0, COS] = 1.0
+        for row, values in zip((X, COS, SIN), inputs.numbers.T, strict=False):
+            self.state[self.first[inputs.owner] + inputs.link_index, row] = values[:, None]
         self.sums = _sketch_sums(linkages.sketch_points([one.sketch for one in linkages.structures]), self.first)
+        self.places = {batch.block_type: batch.state_indices(self.first) for batch in batches}
         self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-        self.places = {batch.block_type: batch.state_indices(self.first) for batch in linkages.batches}
         self.shown: dict[BlockType, _ShownBlocks] = {}
         self.kinds = np.zeros(blocks, dtype=np.int64)
-        slot_count = 1 + max(kind.slot_count for kind in self.places)
-        self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
-        number_counts = (
-            kind.number_count
-            + (SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle))
-            for kind in self.places
-        )
-        self.p = np.zeros((blocks, max(number_counts)))
+        self.slots = np.zeros((blocks, 1 + max(kind.slot_count for kind in self.places)), dtype=np.int64)
+        self.step_table = step_table(1, 0.0)
         self.functions = []
-        for kind_number, batch in enumerate(linkages.batches):
+        numbers: list[Array] = []
+        has_newton_blocks = not all(kind.has_closed_form for kind in self.places)
+        self.frames = _shown_frames(linkages, self.first) if has_newton_blocks else None
+        for number, batch in enumerate(batches):
             kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            self.kinds[indices] = kind_number
+            self.kinds[indices] = number
             self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
             if kind.has_closed_form:
-                self.slots[indices, kind.slot_count] = (
-                    self.judgements.ctypes.data + indices * self.judgements.strides[0]
-                )
-                values = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
-                self.p[indices, : values.shape[1]] = values
+                last_slots = self.judgements.ctypes.data + indices * self.judgements.strides[0]
                 rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
                 rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
                 self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
             else:
-                self.slots[indices, kind.slot_count] = self.table.ctypes.data
+                last_slots = self.step_table.ctypes.data
                 self.functions.append(compile_newton_block(kind, False))
-        if not all(batch.block_type.has_closed_form for batch in linkages.batches):
-            self.frames = _shown_frames(linkages, self.first)
-            self._take_frames()
+            self.slots[indices, kind.slot_count] = last_slots
+            numbers.append(self._start_numbers(batch))
+        self.p = np.zeros((blocks, max(values.shape[1] for values in numbers)))
+        for batch, values in zip(batches, numbers, strict=True):
+            self.p[batch.block_numbers, : values.shape[1]] = values
+
+    def _start_numbers(self, batch: BlockBatch) -> Array:
+        """The numbers of blocks (blocks, numbers): p, then the sums of the sketch, or unknowns to start from."""
+        kind, places = batch.block_type, self.places[batch.block_type]
+        if self.frames is None or kind.has_closed_form:
+            return np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(places), -1)])
+        self.shown[kind] = _unknowns_from_frames(kind, self.frames, places, batch.p)
+        return newton_numbers(kind, batch.p, self.shown[kind].unknowns)
 
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
@@ -142,26 +148,19 @@ class _Starts:
 
     def take_solved_frames(self) -> bool:
         """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
-        if all(blocks.is_shown.all() for blocks in self.shown.values()):
+        if self.frames is None or all(blocks.is_shown.all() for blocks in self.shown.values()):
             return False
         x, y, c, s = np.moveaxis(self.state[:, :, 0], 1, 0)
         with np.errstate(invalid="ignore"):
             is_solved = ~self.frames.is_known & (np.abs(c * c + s * s - 1.0) < 0.5)
-        angle = np.where(is_solved, np.arctan2(s, c), 0.0)
-        pairs = zip((x, y, c, s, angle), self.frames.frame[:5], strict=True)
-        frame = Frame(*(np.where(is_solved, new, old) for new, old in pairs))
+        solved = Frame(x, y, c, s, np.where(is_solved, np.arctan2(s, c), 0.0))
+        frame = _choose_frames(is_solved, solved, self.frames.frame)
         self.frames = self.frames._replace(frame=frame, is_known=self.frames.is_known | is_solved)
-        self._take_frames()
-        return True
-
-    def _take_frames(self) -> None:
         for batch in self.linkages.batches:
-            kind, numbers = batch.block_type, batch.block_numbers
-            if not kind.has_closed_form:
-                shown_blocks = _unknowns_from_frames(kind, self.frames, self.places[kind], batch.p)
-                self.shown[kind] = shown_blocks
-                values = newton_numbers(kind, batch.p, shown_blocks.unknowns)
-                self.p[numbers, : values.shape[1]] = values
+            if not batch.block_type.has_closed_form:
+                values = self._start_numbers(batch)
+                self.p[batch.block_numbers, : values.shape[1]] = values
+        return True
 
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
@@ -203,6 +202,11 @@ def _frame_through(angle: Array, local: Array, world: Array) -> Frame:
     """The frame at an angle in which points of links (2, links) lie where they are in the world."""
     c, s = np.cos(angle), np.sin(angle)
     return Frame(world[0] - (c * local[0] - s * local[1]), world[1] - (s * local[0] + c * local[1]), c, s, angle)
+
+
+def _choose_frames(is_new: BoolArray, new: Frame, old: Frame) -> Frame:
+    """New frames where they are, old ones elsewhere."""
+    return Frame(*(np.where(is_new, *parts) for parts in zip(new[:5], old[:5], strict=True)))
 
 
 class _Slide(NamedTuple):
@@ -271,21 +275,11 @@ def _align_slider(
                 slide.residual({**frames, link: frame_at(0.0, 0.0, angle)})[row] for angle in (0.0, 1.0)
             )
             slider_frame = _frame_through(constant / (constant - rotated), local, world)
-            parts = zip(slider_frame[:5], frames[link][:5], strict=True)
-            frames[link] = Frame(*(np.where(is_aligned, *both) for both in parts))
+            frames[link] = _choose_frames(is_aligned, slider_frame, frames[link])
             known[link] |= is_aligned
 
 
-def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:
-    """Put the frame and the inputs into the places (places, rows, steps)."""
-    state[0, COS] = 1.0
-    inputs = linkages.inputs
-    places = first[inputs.owner] + inputs.link_index
-    for row, values in zip((X, COS, SIN), (inputs.value, *inputs.cos_and_sin()), strict=True):
-        state[places, row] = values[:, None]
-
-
-def _sketch_sums(points: PointArrays, first: IntArray) -> Array:
+def _sketch_sums(points: LinkArrays, first: IntArray) -> Array:
     """The sums of the points of every place (places, SKETCH_SUMS)."""
     px, py, tx, ty = points.numbers.T
     along, across = px * tx + py * ty, px * ty - py * tx
