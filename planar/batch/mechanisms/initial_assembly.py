@@ -9,16 +9,16 @@ import numpy as np
 
 from planar.batch.assembly.assembly_scores import is_at_sketch, is_surely_farther
 from planar.batch.march.prediction import CLEAR_REGULARITY
-from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SIN, SKETCH_SUMS, BlockType, X
+from planar.batch.mechanisms.block_tapes import JUDGED_ROWS, LEAST_CLEARANCE, make_block_kinds, make_tape
+from planar.batch.mechanisms.block_type import COS, MAX_SIGNS, POSE_ROWS, SKETCH_SUMS, BlockType
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
-from planar.batch.mechanisms.newton_march import compile_newton_block, newton_numbers, step_table
-from planar.codegen.tape import LANES, Tape, TapeFormula, compile_block, run_tape
+from planar.batch.mechanisms.newton_march import newton_numbers
+from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, run_steps
+from planar.codegen.tape import LANES
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
 
-LEAST_CLEARANCE = 1e-4
-"""Minimum distance measure from a dead point of an assembly that is taken."""
 SKETCH_DISTANCE_RATIO = 0.075
 """Largest mean distance of points from the sketch (sizes), divided by the regularity of the Jacobian, at which no other
 assembly is nearer."""
@@ -26,6 +26,10 @@ START_TOLERANCE_FACTOR = 100.0
 """Factor of the residual tolerance at a start, which the run checks again."""
 LEAST_SPREAD = 1e-12
 """Squared sizes: points of a link that are nearer to each other define no angle."""
+
+
+NO_INDICES = np.zeros(0, dtype=np.int64)
+NO_POINTS = LinkArrays(NO_INDICES, NO_INDICES, np.zeros((0, 2)))
 
 
 class LinkageAssemblies(NamedTuple):
@@ -56,7 +60,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
     for batch in linkages.batches:
         kind, owner = batch.block_type, batch.owner
         if kind.has_closed_form:
-            rows = starts.judgements[batch.block_numbers, :, 0]
+            rows = starts.judgements(batch)
             block_numbers.append(np.hstack([batch.p, rows[:, : kind.sign_count]]))
             nearest, second, residual, clear = rows[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
             with np.errstate(invalid="ignore"):
@@ -82,10 +86,6 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
     return LinkageAssemblies(is_sure, block_numbers)
 
 
-JUDGED_ROWS = 4
-"""Number of rows after the signs in the result of `BlockType.start_formula`."""
-
-
 class _ShownBlocks(NamedTuple):
     """Unknowns of blocks where they are shown (blocks, unknowns), and which of them are (blocks,)."""
 
@@ -94,43 +94,35 @@ class _ShownBlocks(NamedTuple):
 
 
 class _Starts:
-    """The blocks of linkages as a tape of one step, with the places of all links in a separate state."""
+    """Linkages as a tape of one step, whose results are the poses of all links, then how blocks are judged."""
 
     def __init__(self, linkages: LinkageArrays):
-        self.linkages, batches, blocks, inputs = linkages, linkages.batches, linkages.block_count, linkages.inputs
-        self.first = part_offsets(linkages.link_counts)
-        self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
+        self.linkages, self.first = linkages, part_offsets(linkages.link_counts)
+        self.place_count = 1 + int(self.first[-1])
+        self.state = np.zeros((self.place_count + linkages.block_count, MAX_SIGNS + JUDGED_ROWS, LANES))
         self.state[0, COS] = 1.0
-        for row, values in zip((X, COS, SIN), inputs.numbers.T, strict=False):
-            self.state[self.first[inputs.owner] + inputs.link_index, row] = values[:, None]
         self.sums = _sketch_sums(linkages.sketch_points([one.sketch for one in linkages.structures]), self.first)
-        self.places = {batch.block_type: batch.state_indices(self.first) for batch in batches}
-        self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
+        types = [batch.block_type for batch in linkages.batches]
+        self.kinds = make_block_kinds(types, False, is_start=True)
+        self.places = {batch.block_type: self._link_places(batch.owner[:, None], batch.link_indices)
+                       for batch in linkages.batches}  # fmt: skip
         self.shown: dict[BlockType, _ShownBlocks] = {}
-        self.kinds = np.zeros(blocks, dtype=np.int64)
-        self.slots = np.zeros((blocks, 1 + max(kind.slot_count for kind in self.places)), dtype=np.int64)
-        self.step_table = step_table(1, 0.0)
-        self.functions = []
-        numbers: list[Array] = []
-        has_newton_blocks = not all(kind.has_closed_form for kind in self.places)
-        self.frames = _shown_frames(linkages, self.first) if has_newton_blocks else None
-        for number, batch in enumerate(batches):
-            kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            self.kinds[indices] = number
-            self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
-            if kind.has_closed_form:
-                last_slots = self.judgements.ctypes.data + indices * self.judgements.strides[0]
-                rows = [(slot, row) for slot in range(kind.slot_count)[batch.inner_slots] for row in range(POSE_ROWS)]
-                rows += [(kind.slot_count, row) for row in range(kind.sign_count + JUDGED_ROWS)]
-                self.functions.append(compile_block(TapeFormula(kind.start_formula, tuple(rows))))
-            else:
-                last_slots = self.step_table.ctypes.data
-                self.functions.append(compile_newton_block(kind, False))
-            self.slots[indices, kind.slot_count] = last_slots
-            numbers.append(self._start_numbers(batch))
-        self.p = np.zeros((blocks, max(values.shape[1] for values in numbers)))
-        for batch, values in zip(batches, numbers, strict=True):
-            self.p[batch.block_numbers, : values.shape[1]] = values
+        has_closed_form = all(kind.has_closed_form for kind in types)
+        self.frames = None if has_closed_form else _shown_frames(linkages, self.first)
+        self.tape = self._make_tape()
+
+    def _link_places(self, owner: IntArray, link_index: IntArray) -> IntArray:
+        """The places of links among those of all linkages; 0 is the frame of all."""
+        return np.where(link_index > 0, link_index + self.first[owner], 0)
+
+    def _make_tape(self) -> TapedLinkages:
+        numbers = [self._start_numbers(batch) for batch in self.linkages.batches]
+        last_slots = [
+            self.place_count + batch.block_numbers if batch.block_type.has_closed_form else STEP_TABLE
+            for batch in self.linkages.batches
+        ]
+        tape = make_tape(self.linkages, numbers, self._link_places, last_slots, NO_POINTS, NO_INDICES)
+        return tape._replace(tolerance=START_TOLERANCE_FACTOR * self.linkages.tolerance)
 
     def _start_numbers(self, batch: BlockBatch) -> Array:
         """The numbers of blocks (blocks, numbers): p, then the sums of the sketch, or unknowns to start from."""
@@ -142,30 +134,29 @@ class _Starts:
 
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
-        tolerance = START_TOLERANCE_FACTOR * self.linkages.tolerance
-        tape = Tape(self.linkages.first_block, self.kinds, self.slots, self.p, tolerance, clearance)
-        return run_tape(self.functions, 1, tape).good > 0
+        return run_steps(self.tape._replace(clearance=clearance), self.kinds, False, self.state, 1).good > 0
+
+    def judgements(self, batch: BlockBatch) -> Array:
+        """How blocks in closed form are judged (blocks, rows), see `BlockType.start_formula`."""
+        return self.state[self.place_count + batch.block_numbers, :, 0]
 
     def take_solved_frames(self) -> bool:
         """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
         if self.frames is None or all(blocks.is_shown.all() for blocks in self.shown.values()):
             return False
-        x, y, c, s = np.moveaxis(self.state[:, :, 0], 1, 0)
+        x, y, c, s = self.state[: self.place_count, :POSE_ROWS, 0].T
         with np.errstate(invalid="ignore"):
             is_solved = ~self.frames.is_known & (np.abs(c * c + s * s - 1.0) < 0.5)
         solved = Frame(x, y, c, s, np.where(is_solved, np.arctan2(s, c), 0.0))
         frame = _choose_frames(is_solved, solved, self.frames.frame)
         self.frames = self.frames._replace(frame=frame, is_known=self.frames.is_known | is_solved)
-        for batch in self.linkages.batches:
-            if not batch.block_type.has_closed_form:
-                values = self._start_numbers(batch)
-                self.p[batch.block_numbers, : values.shape[1]] = values
+        self.tape = self._make_tape()
         return True
 
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
         inner = self.places[batch.block_type][:, batch.inner_slots]
-        x, y, c, s = np.moveaxis(self.state[inner, :, 0], 2, 0)
+        x, y, c, s = np.moveaxis(self.state[inner, :POSE_ROWS, 0], 2, 0)
         counts, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
         with np.errstate(invalid="ignore", over="ignore"):
             mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across

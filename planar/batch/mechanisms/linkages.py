@@ -45,11 +45,6 @@ class BlockBatch:
     p: Array
     block_numbers: IntArray
 
-    def state_indices(self, first: IntArray) -> IntArray:
-        """The places among those of all linkages, of which linkage k has those after first[k]; 0 is the frame of
-        all."""
-        return np.where(self.link_indices > 0, self.link_indices + first[self.owner][:, None], 0)
-
     @property
     def inner_slots(self) -> slice:
         """Which of the slots are those of inner links."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, padded_steps, run_tape
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeResult, padded_steps, run_tape
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 
@@ -168,6 +168,34 @@ def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divide
         first = last
 
 
+def run_steps(taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: Array, count: int) -> TapeResult:
+    """Compute the result points (points, rows, numbers) of linkages at `count` steps of a turn, or at the start."""
+    stride, slots = padded_steps(count), taped.slots
+    room = np.empty((max(-int(slots.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
+    rotation = rotations(count)
+    room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(rotation), np.sin(rotation), rotation
+    if kinds.frame_rows:
+        room[-1 - FRAME] = 0.0
+        for row, value in kinds.frame_rows.items():
+            room[-1 - FRAME, row] = value
+    addresses = np.where(
+        slots >= 0, points.ctypes.data + slots * points.strides[0], room.ctypes.data + (-1 - slots) * room.strides[0]
+    )
+    if kinds.step_table is not None:
+        table = np.ascontiguousarray(kinds.step_table(count, FULL_TURN / max(count - 1, 1)))
+        addresses[slots == STEP_TABLE] = table.ctypes.data
+    present = np.flatnonzero(np.bincount(taped.kinds))
+    numbers = np.zeros(present[-1] + 1, dtype=np.int64)
+    numbers[present] = np.arange(len(present))
+    tape = Tape(taped.first, numbers[taped.kinds], addresses, taped.p, taped.tolerance, taped.clearance)
+    return run_tape([kinds.compile(k, polished) for k in present.tolist()], count, tape)
+
+
+def rotations(count: int) -> Array:
+    """The rotation of the inputs at `count` steps of a turn, padded."""
+    return np.arange(padded_steps(count)) * (FULL_TURN / max(count - 1, 1))
+
+
 def _run_once(
     taped: TapedLinkages,
     kinds: BlockKinds,
@@ -179,34 +207,18 @@ def _run_once(
     find_endings: Mapping[int, FindEnding],
 ) -> None:
     """Run linkages with steps divided by a factor, and note the endings of those that this decides."""
-    count = steps * finer + 1
-    stride, slots, points = padded_steps(count), taped.slots, values
-    rotation = np.arange(stride) * (FULL_TURN / (count - 1))
+    count, points = steps * finer + 1, values
     if finer > 1:
-        is_result = slots >= 0
-        rows, places = np.unique(slots[is_result], return_inverse=True)
-        points, slots = np.empty((len(rows), values.shape[1], stride)), slots.copy()
+        is_result = taped.slots >= 0
+        rows, places = np.unique(taped.slots[is_result], return_inverse=True)
+        points, slots = np.empty((len(rows), values.shape[1], padded_steps(count))), taped.slots.copy()
         slots[is_result] = places
-    room = np.empty((max(-int(slots.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
-    room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(rotation), np.sin(rotation), rotation
-    if kinds.frame_rows:
-        room[-1 - FRAME] = 0.0
-        for row, value in kinds.frame_rows.items():
-            room[-1 - FRAME, row] = value
-    addresses = np.where(
-        slots >= 0, points.ctypes.data + slots * points.strides[0], room.ctypes.data + (-1 - slots) * room.strides[0]
-    )
-    if kinds.step_table is not None:
-        table = np.ascontiguousarray(kinds.step_table(count, FULL_TURN / (count - 1)))
-        addresses[slots == STEP_TABLE] = table.ctypes.data
-    present = np.flatnonzero(np.bincount(taped.kinds))
-    numbers = np.zeros(present[-1] + 1, dtype=np.int64)
-    numbers[present] = np.arange(len(present))
-    tape = Tape(taped.first, numbers[taped.kinds], addresses, taped.p, taped.tolerance, taped.clearance)
-    good, outcome, last_blocks = run_tape([kinds.compile(k, polished) for k in present.tolist()], count, tape)
+        taped = taped._replace(slots=slots)
+    good, outcome, last_blocks = run_steps(taped, kinds, polished, points, count)
     if finer > 1:
         values[rows, :, : steps + 1] = points[:, :, :count:finer]
 
+    rotation = rotations(count)
     which, is_sure, is_dead = taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
     endings.solved[which[is_sure]] = (good[is_sure] - 1) // finer + 1
     first_bad, dead = good[is_dead], which[is_dead]
