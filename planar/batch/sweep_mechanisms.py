@@ -18,7 +18,6 @@ from planar.batch.mechanisms.part_runs import solve_part
 from planar.batch.mechanisms.pins import result_pins
 from planar.batch.mechanisms.results import Each, SweptPart
 from planar.batch.mechanisms.tape_runs import make_values
-from planar.batch.reductions.point_reductions import ResultReduction
 from planar.batch.reductions.reduced_sweep import (
     ReducedBlock,
     ReducedSweep,
@@ -140,7 +139,7 @@ def sweep_each(  # many: the public signature; # long: its docstring
     if reduce is not None:
         reductions = read_reductions(reduce, str, step_count)
         for measure in reductions.measures:
-            if isinstance(measure, ResultReduction):
+            if not measure.is_of_point:
                 raise BadInput("reduce", f"mechanisms tell points alone, not {measure.name}.{measure.quantity}")
         functions, (names, rates) = reductions.functions, reductions.with_points(names, rates)
     request = SweepRequest(step_count, names, rates, pair)

@@ -12,14 +12,7 @@ from numpy.typing import DTypeLike
 
 from planar.batch.block import SolvedDesigns
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
-from planar.batch.reductions.point_reductions import (
-    EXTREMES_ENDING,
-    HARMONICS,
-    MEASURES,
-    RESULTS,
-    PointReduction,
-    ResultReduction,
-)
+from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, RESULT_ARGUMENTS, NamedReduction
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import INTERRUPTED, BlockStore, MemoryStore, SweepPlan
 from planar.foundation.arrays import Array, BoolArray, IntArray
@@ -94,23 +87,22 @@ class Reductions(NamedTuple):
     functions: dict[str, Reduction[Any]]
 
     @property
-    def measures(self) -> list[PointReduction | ResultReduction]:
+    def measures(self) -> list[NamedReduction]:
         """Those that are asked for by name."""
-        functions = self.functions.values()
-        return [function for function in functions if isinstance(function, PointReduction | ResultReduction)]
+        return [function for function in self.functions.values() if isinstance(function, NamedReduction)]
 
     def with_results(self, asked: Mapping[str, Sequence[str] | str]) -> dict[str, tuple[str, ...]]:
         """The names of links, pairs and so on that are asked for, with those of measures."""
         names = {word: (given,) if isinstance(given, str) else tuple(given) for word, given in asked.items()}
         for measure in self.measures:
-            if isinstance(measure, ResultReduction):
-                names[RESULTS[measure.quantity]] += (measure.name,)
+            if not measure.is_of_point:
+                names[RESULT_ARGUMENTS[measure.quantity]] += (measure.name,)
         return names
 
     def with_points(self, points: Sequence[Any] | None, rates: bool) -> tuple[tuple[Any, ...] | None, bool]:
         """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
         only measures are. Raises BadInput."""
-        measured = dict.fromkeys(measure.point for measure in self.measures if isinstance(measure, PointReduction))
+        measured = dict.fromkeys(measure.name for measure in self.measures if measure.is_of_point)
         wants_rates = any(measure.wants_rates for measure in self.measures)
         if len(self.measures) == len(self.functions):
             return tuple(measured), wants_rates
@@ -128,16 +120,14 @@ def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any]
 
 def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Any:
     if isinstance(given, str):
-        point, _, measure = given.rpartition(".")
-        if measure.removesuffix(EXTREMES_ENDING) in RESULTS and measure not in MEASURES:
-            return ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
+        name_of_result, _, measure = given.rpartition(".")
         if measure not in MEASURES:
-            known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
-            hint = suggest_name(measure, known, "measures", None)
+            hint = suggest_name(measure, list(MEASURES), "measures", None)
             raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{hint}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
-        return PointReduction(result_name(point), measure)
+        reduction = NamedReduction(name_of_result, measure)
+        return NamedReduction(result_name(name_of_result), measure) if reduction.is_of_point else reduction
     if not callable(given):
         wanted = "a measure, as 'C.bounding_box', or a function of a sweep"
         raise BadInput(f"reduce.{name}", f"{wanted} is wanted, not {given!r:.40}")
