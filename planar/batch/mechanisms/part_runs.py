@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -103,7 +103,7 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
     if pins is not None and len(pinned) == len(mechanisms):
         points = pins
     else:
-        points = _point_table(mechanisms, request, pinned, pins, arrays)
+        points = _point_table(mechanisms, request.points, pinned, pins, arrays)
     if values is None:
         watched_count = 0 if arrays is None else len(arrays.watched_points.owner)
         values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
@@ -135,34 +135,29 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
 
 def _point_table(
     mechanisms: Mechanisms,
-    request: SweepRequest,
-    numbers: IntArray,
+    names: Sequence[str] | None,
+    pinned: IntArray,
     pins: PointTable | None,
     arrays: LinkageArrays | None,
 ) -> PointTable:
-    """The points of all mechanisms: pins of those of these numbers, of others those named in the request, or all that
-    move."""
-    names: dict[int, Sequence[str]] = {}
-    if pins is not None:
-        names |= {k: pins.names(row) for row, k in enumerate(numbers.tolist())}
-    if arrays is not None:
-        for k, structure in zip(arrays.which.tolist(), arrays.structures, strict=True):
-            if request.points is None:
-                names.setdefault(k, structure.moving_points)
-            else:
-                names.setdefault(k, [name for name in request.points if name in structure.members])
-    for k in range(len(mechanisms)):
-        if k not in names:
-            names[k] = _result_points(mechanisms[k], request.points)
-    return PointTable.of_names([names[k] for k in range(len(mechanisms))])
+    """The points of all mechanisms that are results: pins of those that are pinned bars, points of these names of
+    others; all that move without names."""
+    pin_rows = {} if pins is None else {k: row for row, k in enumerate(pinned.tolist())}
+    structures = {} if arrays is None else dict(zip(arrays.which.tolist(), arrays.structures, strict=True))
 
+    def point_names(k: int) -> Sequence[str]:
+        if pins is not None and k in pin_rows:
+            return pins.names(pin_rows[k])
+        known: Collection[str]
+        if k in structures:
+            known, moving = structures[k].members, structures[k].moving_points
+        else:
+            members = named_points(mechanisms[k])
+            known = [name for name, _ in members]
+            moving = tuple(name for name, points in members if mechanisms[k].frame not in dict(points))
+        return moving if names is None else [name for name in names if name in known]
 
-def _result_points(mechanism: Mechanism, points: Sequence[str] | None) -> list[str]:
-    """The names of the points that are results of a mechanism: those of `points` that it has, or all that move."""
-    links = {name: {link for link, _ in members} for name, members in named_points(mechanism)}
-    if points is not None:
-        return [name for name in points if name in links]
-    return [name for name in links if mechanism.frame not in links[name]]
+    return PointTable.of_names(list(map(point_names, range(len(mechanisms)))))
 
 
 def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> SolvedDesign:

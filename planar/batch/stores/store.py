@@ -301,7 +301,8 @@ class MemoryStore(BlockStore):
             raise BadInput("store", message)
         self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
-        self.inputs: Array | None = None
+        self.inputs: list[tuple[slice, Array]] = []
+        "of every block where the running input is: in one row for all of its designs, or in a row of each"
         self.dead_point, self.stop_position = np.full((2, plan.design_count), np.nan)
 
     def output_array(self, part: slice) -> Array:
@@ -313,20 +314,24 @@ class MemoryStore(BlockStore):
             out[:] = done.out
         self.status[part], self.dead_point[part] = done.status, done.dead_point
         self.stop_position[part] = done.stop_position
-        self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
+        self.inputs.append((part, done.input))
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         for number, part in parts.items():
             count = part.stop - part.start
             self.out[:, :, part], self.status[part] = np.nan, INTERRUPTED
-            self.inputs = _join_inputs(self.inputs, np.full((count, self.status.shape[1]), np.nan), part, self.plan)
+            self.inputs.append((part, np.full(self.status.shape[1], np.nan)))
             self.block_notes[number] = 0, 0, ((INTERRUPTED, count, reason),)
 
     def result(self) -> Sweep:
-        assert self.inputs is not None
+        inputs = self.inputs[0][1]
+        if not all(values.ndim == 1 and np.array_equal(values, inputs) for _, values in self.inputs):
+            inputs = np.empty(self.status.shape)
+            for part, values in self.inputs:
+                inputs[part] = values
         ends = self.dead_point, self.stop_position
-        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, self.inputs, ends)
+        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, inputs, ends)
 
 
 def result_views(out: Array, plan: SweepPlan) -> list[Array]:
@@ -338,15 +343,3 @@ def result_views(out: Array, plan: SweepPlan) -> list[Array]:
         by_design[:, :, first] if row.width == 1 else by_design[:, :, first : first + row.width]
         for row, first in zip(rows, offsets, strict=False)
     ]
-
-
-def _join_inputs(inputs: Array | None, part_inputs: Array, part: slice, plan: SweepPlan) -> Array:
-    """The positions of the running input with those of a block; one row as long as all blocks agree."""
-    is_common = inputs is None or (inputs.ndim == 1 and np.array_equal(inputs, part_inputs))
-    if part_inputs.ndim == 1 and is_common:
-        return part_inputs
-    if inputs is None or inputs.ndim == 1:
-        row = np.full(plan.all_designs.steps + 1, np.nan) if inputs is None else inputs
-        inputs = np.tile(row, (plan.design_count, 1))
-    inputs[part] = part_inputs
-    return inputs

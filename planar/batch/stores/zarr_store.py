@@ -47,18 +47,17 @@ class ZarrStore(FolderStore):
 
     def _open_arrays(self) -> Iterator[tuple[str, Any]]:
         """All arrays by name, those made that are not there or not as they have to be."""
-        plan, rows, steps = self.plan, self.plan.block_size, self.plan.all_designs.steps + 1
-        row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        vector: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
-        vector["dimension_names"] = ("design", "step", "axis")
-        for result in plan.rows:
-            shape = vector if result.width == 2 else row
-            yield self._open_array(_array_path(result), dtype=plan.all_designs.dtype, fill_value=np.nan, **shape)
-        yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
-        yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
-        of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
-        for name in ("dead_point", "stop_position"):
-            yield self._open_array(name, dtype="float64", fill_value=np.nan, **of_designs)
+        plan, row = self.plan, (self.plan.all_designs.steps + 1,)
+        layout: dict[str, tuple[str, float, tuple[int, ...]]] = {
+            _array_path(result): (plan.all_designs.dtype, np.nan, (*row, 2) if result.width == 2 else row)
+            for result in plan.rows
+        }
+        layout |= {"status": ("int8", MISSING_STATUS, row), "input": ("float64", np.nan, row)}
+        layout |= dict.fromkeys(("dead_point", "stop_position"), ("float64", np.nan, ()))
+        for name, (dtype, fill_value, shape) in layout.items():
+            of_array = {"shape": (plan.design_count, *shape), "chunks": (plan.block_size, *shape)}
+            dimensions = ("design", "step", "axis")[: 1 + len(shape)]
+            yield self._open_array(name, dtype=dtype, fill_value=fill_value, dimension_names=dimensions, **of_array)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
         for name, values in plan.design_columns.items():
