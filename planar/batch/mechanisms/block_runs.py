@@ -10,14 +10,14 @@ import numpy as np
 from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.block_tapes import make_block_kinds, make_tape, temporary_slots
 from planar.batch.mechanisms.initial_assembly import LinkageAssemblies
-from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, SweepRequest, watched_links
+from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, watched_links
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
     STEP_TABLE,
     Endings,
     LinkageEnding,
-    run_taped_linkages,
+    PreparedTape,
 )
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.equations.mechanism_numbers import shapes_of_links
@@ -27,17 +27,13 @@ from planar.model.mechanism import links_counting_turns, running_input_index
 from planar.solving.stops import PairStops
 
 
-def run_blocks(
-    arrays: LinkageArrays,
-    assemblies: LinkageAssemblies,
-    points: PointTable,
-    values: Array,
-    endings: Endings,
-    request: SweepRequest,
-) -> None:
-    """Run linkages block after block; `points` says which are results, and their rows in values.
+def prepare_blocks(
+    arrays: LinkageArrays, assemblies: LinkageAssemblies, points: PointTable, pair: str | None
+) -> PreparedTape:
+    """Prepare the tape of linkages that are solved block after block, with the input that runs at `pair`; `points` are
+    the results of the part.
 
-    Behind these rows are those of the points of links that decide where pairs with stops are.
+    Behind their rows are those of the points of links that decide where pairs with stops are.
     """
     results = arrays.points([points.names(k) for k in arrays.which.tolist()])
     first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
@@ -54,11 +50,15 @@ def run_blocks(
         arrays, assemblies.block_numbers, temporary_slots, [STEP_TABLE] * len(arrays.batches), tape_points, rows
     ).select(np.flatnonzero(assemblies.is_sure))
     find_endings = {
-        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
+        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
     }
-    kinds = make_block_kinds([batch.block_type for batch in arrays.batches], request.rates)
-    run_taped_linkages(taped, kinds, values, request.steps, endings, find_endings)
+    types = [batch.block_type for batch in arrays.batches]
+    return PreparedTape(taped, partial(make_block_kinds, types), find_endings)
+
+
+def note_dead_links(arrays: LinkageArrays, endings: Endings) -> None:
+    """Note the reasons of linkages with blocks that come to a dead point."""
     is_dead = (endings.solved >= 0) & (endings.outcome == DEAD_POINT_NUMBER)
     for number in arrays.which[is_dead[arrays.which]].tolist():
         links = arrays.links_of_block(int(endings.links[number, 0]))

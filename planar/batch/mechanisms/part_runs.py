@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.general_path import SolvedDesign, solve_design
-from planar.batch.mechanisms.block_runs import run_blocks
-from planar.batch.mechanisms.initial_assembly import LinkageAssemblies, find_linkage_assemblies
+from planar.batch.mechanisms.block_runs import note_dead_links, prepare_blocks
+from planar.batch.mechanisms.initial_assembly import find_linkage_assemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, SweepRequest, make_linkage_arrays
-from planar.batch.mechanisms.pins import make_pin_tape, result_pins, run_pins
+from planar.batch.mechanisms.pins import frame_pins, make_pin_tape, prepare_pins, result_pins
 from planar.batch.mechanisms.results import PointTable, SweptPart
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
     FULL_TURN,
     Endings,
-    TapedLinkages,
+    PreparedTape,
     clear_points,
     make_values,
+    run_taped_linkages,
 )
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.turns import take_turn
@@ -55,67 +56,87 @@ def solve_part(
 
 
 class _PreparedPart(NamedTuple):
-    """What is known of the mechanisms of a part before they run: the numbers of those that are pinned bars, these as
-    arrays, and the tape of those that are solved pin by pin; those that are solved block by block, and their
-    assemblies."""
+    """What is known of the mechanisms of a part before they run: the points that are results; where the input of each
+    starts (rad); the tapes of those that are solved pin by pin, and block by block, these as arrays; the rows of pins
+    on the frame, and where they are."""
 
-    pinned: IntArray
-    linkages: PinnedLinkages | None
-    pin_tape: TapedLinkages | None
+    points: PointTable
+    start: Array
+    tapes: list[PreparedTape]
     arrays: LinkageArrays | None
-    assemblies: LinkageAssemblies | None
+    fixed_rows: IntArray
+    fixed_places: Array
 
 
-def _prepare(mechanisms: Mechanisms, pair: str | None) -> _PreparedPart:
-    """Prepare a part with the input that runs at `pair`, once for linkages that are arrays, or a mechanism alone."""
-    pinned, linkages, pin_tape, assemblies = np.arange(len(mechanisms)), None, None, None
-    owner: Any = mechanisms if isinstance(mechanisms, PinnedLinkages) else mechanisms[0]
-    prepared: dict[str | None, _PreparedPart] = {}
-    if isinstance(mechanisms, PinnedLinkages) or len(mechanisms) == 1:
-        prepared = owner.__dict__.setdefault("_prepared_parts", prepared)
-    if pair in prepared:
-        return prepared[pair]
-    if isinstance(mechanisms, PinnedLinkages):
-        linkages = mechanisms
-    else:
-        layouts = {
-            k: mechanism.layout
-            for k, mechanism in enumerate(mechanisms)
-            if isinstance(mechanism, PinnedMechanism) and mechanism.layout is not None and not mechanism.stops
-        }
-        pinned = np.array([] if pair is not None else list(layouts), dtype=np.int64)
-        if len(pinned):
-            linkages = PinnedLinkages.from_layouts(list(layouts.values()))
-    is_open = np.ones(len(mechanisms), dtype=bool)
+def _prepare_once(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
+    """Prepare a part; linkages that are arrays, or a mechanism alone, are not prepared again for the same points."""
+    if len(mechanisms) > 1 and not isinstance(mechanisms, PinnedLinkages):
+        return _prepare(mechanisms, request)
+    cached = (mechanisms if isinstance(mechanisms, PinnedLinkages) else mechanisms[0]).__dict__
+    known, part = cached.get("_prepared_part", (None, None))
+    if part is None or known != (request.pair, request.points):
+        part = _prepare(mechanisms, request)
+        cached["_prepared_part"] = (request.pair, request.points), part
+    return part  # type: ignore[no-any-return]
+
+
+def _prepare(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
+    pinned, linkages = _pinned_linkages(mechanisms, request.pair)
+    is_open, start = np.ones(len(mechanisms), dtype=bool), np.zeros(len(mechanisms))
+    pins = pin_tape = assemblies = None
     if linkages is not None:
-        pin_tape = make_pin_tape(linkages)
+        pins, pin_tape, start[pinned] = (
+            result_pins(linkages, request.points),
+            make_pin_tape(linkages),
+            linkages.crank_angles,
+        )
         is_open[pinned[pin_tape.which]] = False
-    arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, pair)
-    if arrays is not None:
-        assemblies = find_linkage_assemblies(arrays)
-    prepared[pair] = _PreparedPart(pinned, linkages, pin_tape, arrays, assemblies)
-    return prepared[pair]
-
-
-def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
-    pinned, linkages, pin_tape, arrays, assemblies = _prepare(mechanisms, request.pair)
-    pins = None if linkages is None else result_pins(linkages, request.points)
+    arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, request.pair)
     if pins is not None and len(pinned) == len(mechanisms):
         points = pins
     else:
         points = _point_table(mechanisms, request.points, pinned, pins, arrays)
-    if values is None:
-        watched_count = 0 if arrays is None else len(arrays.watched_points.owner)
-        values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
-
-    endings = Endings.undecided(len(mechanisms))
-    if linkages is not None and pin_tape is not None and pins is not None:
+    tapes: list[PreparedTape] = []
+    fixed_rows, fixed_places = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
+    if linkages is not None and pins is not None and pin_tape is not None:
         rows = np.arange(len(pins.codes)) + np.repeat(points.first[pinned] - pins.first[:-1], np.diff(pins.first))
-        endings.start[pinned] = linkages.crank_angles
-        run_pins(linkages, pin_tape, pinned, pins, rows, values, endings, request.steps)
-    if arrays is not None and assemblies is not None:
-        endings.start[arrays.which] = arrays.start
-        run_blocks(arrays, assemblies, points, values, endings, request)
+        result_numbers = pins.codes + np.repeat(linkages.first_pin[:-1], np.diff(pins.first))
+        is_fixed = np.isin(result_numbers, frame_pins(linkages))
+        fixed_rows, fixed_places = rows[is_fixed], linkages.positions[result_numbers[is_fixed]]
+        if len(pin_tape.which):
+            tapes.append(prepare_pins(linkages, pin_tape, pinned, result_numbers, rows))
+    if arrays is not None:
+        start[arrays.which] = arrays.start
+        tapes.append(prepare_blocks(arrays, find_linkage_assemblies(arrays), points, request.pair))
+    return _PreparedPart(points, start, tapes, arrays, fixed_rows, fixed_places)
+
+
+def _pinned_linkages(mechanisms: Mechanisms, pair: str | None) -> tuple[IntArray, PinnedLinkages | None]:
+    """Those of the mechanisms that are pinned bars, their numbers and as arrays."""
+    if isinstance(mechanisms, PinnedLinkages):
+        return np.arange(len(mechanisms)), mechanisms
+    layouts = {
+        k: mechanism.layout
+        for k, mechanism in enumerate(mechanisms if pair is None else ())
+        if isinstance(mechanism, PinnedMechanism) and mechanism.layout is not None and not mechanism.stops
+    }
+    if not layouts:
+        return np.arange(0), None
+    return np.array(list(layouts)), PinnedLinkages.from_layouts(list(layouts.values()))
+
+
+def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
+    part = _prepare_once(mechanisms, request)
+    points, endings = part.points, Endings.undecided(part.start)
+    if values is None:
+        watched_count = 0 if part.arrays is None else len(part.arrays.watched_points.owner)
+        values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
+    values[part.fixed_rows] = 0.0
+    values[part.fixed_rows, :2] = part.fixed_places[:, :, None]
+    for tape in part.tapes:
+        run_taped_linkages(tape, values, request.steps, endings)
+    if part.arrays is not None:
+        note_dead_links(part.arrays, endings)
 
     undecided = np.flatnonzero(endings.solved < 0)
     endings.solved[undecided], endings.outcome[undecided] = 0, DEAD_POINT_NUMBER

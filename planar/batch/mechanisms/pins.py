@@ -21,9 +21,8 @@ from planar.batch.mechanisms.tape_runs import (
     TABLE_COS,
     TABLE_SIN,
     BlockKinds,
-    Endings,
+    PreparedTape,
     TapedLinkages,
-    run_taped_linkages,
 )
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
@@ -357,35 +356,23 @@ def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
 
 
-def run_pins(
-    linkages: PinnedLinkages,
-    tape: TapedLinkages,
-    numbers: IntArray,
-    points: PointTable,
-    rows: IntArray,
-    values: Array,
-    endings: Endings,
-    steps: int,
-) -> None:
-    """Run the linkages on the tape, see `make_pin_tape`; `numbers` (linkages,) are those in the part.
+def prepare_pins(
+    linkages: PinnedLinkages, tape: TapedLinkages, numbers: IntArray, pins: IntArray, rows: IntArray
+) -> PreparedTape:
+    """Prepare the tape of linkages, see `make_pin_tape`; `numbers` (linkages,) are those in the part.
 
-    `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
-    that linkages share.
+    `pins` (points,) are those that are results, numbered through all linkages, and `rows` their rows. Other pins have
+    temporary slots that linkages share.
     """
-    rates = values.shape[1] == POINT_ROWS[True]
     slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
     slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
-    pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
     slots[pins] = rows
     block_slots = slots[tape.slots]
     block_slots[tape.kinds == PinStep.CRANK, 0] = TABLE
-    tape = tape._replace(which=numbers[tape.which], slots=block_slots)
-    kinds = BlockKinds(
-        lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
+    return PreparedTape(tape._replace(which=numbers[tape.which], slots=block_slots), _pin_kinds)
+
+
+def _pin_kinds(rates: bool) -> BlockKinds:
+    return BlockKinds(
+        lambda kind, polished: compile_block(pin_formulas(rates, polished)[kind], LEAST_COSINE), POINT_ROWS[rates]
     )
-    run_taped_linkages(tape, kinds, values, steps, endings)
-    is_fixed = np.zeros(len(linkages.positions), dtype=bool)
-    is_fixed[frame_pins(linkages)] = True
-    is_fixed_point = is_fixed[pins]
-    values[rows[is_fixed_point]] = 0.0
-    values[rows[is_fixed_point], :2] = linkages.positions[pins[is_fixed_point]][:, :, None]

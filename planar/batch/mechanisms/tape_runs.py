@@ -88,11 +88,11 @@ class Endings(NamedTuple):
     general_inputs: dict[int, Array]
 
     @classmethod
-    def undecided(cls, linkage_count: int) -> Endings:
+    def undecided(cls, start: Array) -> Endings:
         """The endings of a part before anything is decided."""
-        solved, outcome = np.full(linkage_count, -1), np.zeros(linkage_count, dtype=np.int64)
-        links, near = np.zeros((linkage_count, 2), dtype=np.int64), np.zeros((linkage_count, 2))
-        return cls(np.zeros(linkage_count), solved, outcome, links, near, {}, {})
+        solved, outcome = np.full(len(start), -1), np.zeros(len(start), dtype=np.int64)
+        links, near = np.zeros((len(start), 2), dtype=np.int64), np.zeros((len(start), 2))
+        return cls(start, solved, outcome, links, near, {}, {})
 
 
 class LinkageEnding(NamedTuple):
@@ -111,23 +111,24 @@ OUTCOME_NUMBERS = {outcome: number for number, outcome in enumerate(Outcome)}
 DEAD_POINT_NUMBER = OUTCOME_NUMBERS[Outcome.DEAD_POINT]
 
 
-def run_taped_linkages(
-    taped: TapedLinkages,
-    kinds: BlockKinds,
-    values: Array,
-    steps: int,
-    endings: Endings,
-    find_endings: Mapping[int, FindEnding] = {},
-) -> None:
+class PreparedTape(NamedTuple):
+    """Linkages on a tape whose result points are rows of a part, the kinds of its blocks without and with rates, and
+    functions for the linkages with stops by their numbers."""
+
+    taped: TapedLinkages
+    make_kinds: Callable[[bool], BlockKinds]
+    find_endings: Mapping[int, FindEnding] = {}
+
+
+def run_taped_linkages(tape: PreparedTape, values: Array, steps: int, endings: Endings) -> None:
     """Run linkages through a turn of their inputs: values (points, `POINT_ROWS`, numbers), see `make_values`, and
-    the `endings` are filled. Other solvers take what no attempt decides. `find_endings` are those of linkages with
-    stops.
-    """
+    the `endings` are filled. Other solvers take what no attempt decides."""
+    taped, kinds = tape.taped, tape.make_kinds(values.shape[1] == POINT_ROWS[True])
     undecided = np.arange(len(taped.which))
     for refinement, polished in ATTEMPTS if len(undecided) else ():
         finer = step_division(steps) * refinement
         for indices in _chunks(taped, undecided, padded_steps(steps * finer + 1) * values.shape[1] * 8, finer > 1):
-            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, find_endings)
+            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, tape.find_endings)
         undecided = undecided[endings.solved[taped.which[undecided]] < 0]
         if not undecided.size:
             break
