@@ -47,37 +47,6 @@ def worker_count(executor: Executor) -> int:
     return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
 
 
-def run_in_threads(
-    threads: int, tasks: Iterable[tuple[int, Task]], function: Callable[[int, Task], Result]
-) -> Iterator[tuple[int, Result]]:
-    """Yield the numbers and results of tasks as they come; tasks are taken when a thread is free.
-
-    Exceptions of tasks are raised.
-    """
-    waiting = iter(tasks)
-    first_tasks = list(islice(waiting, 2 if threads > 1 else 0))
-    waiting = chain(first_tasks, waiting)
-    if len(first_tasks) < 2:  # one task needs no other thread
-        for k, task in waiting:
-            yield k, function(k, task)
-        return
-    running: dict[Future[Result], int] = {}
-    with ThreadPoolExecutor(threads, thread_name_prefix="planar") as pool:
-        try:
-            while True:
-                with suppress(StopIteration):
-                    while len(running) < TASKS_PER_WORKER * threads:
-                        k, task = next(waiting)
-                        running[pool.submit(copy_context().run, function, k, task)] = k
-                if not running:
-                    return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    yield running.pop(future), future.result()
-        finally:
-            for future in running:
-                future.cancel()
-
-
 def run_tasks(
     threads: int,
     executor: Executor | None,
@@ -85,37 +54,53 @@ def run_tasks(
     tasks: Iterable[tuple[int, Task]],
     run_here: Callable[[int, Task], Result],
 ) -> Iterator[tuple[int, Result]]:
-    """Yield the numbers and results of tasks as they come: by an executor if there is one, else in threads.
+    """Yield the numbers and results of tasks as they come: of `run_there` by an executor if there is one, else of
+    `run_here` in threads. Tasks are taken when a worker is free, and none after the time limit.
 
-    No task is started after the time limit.
+    What a task raises in a thread is raised. Of an executor a BadInput is raised; this process runs a task that is lost
+    otherwise.
     """
-    if executor is None:
-        return run_in_threads(threads, within_time(tasks), run_here)
-    return run_in_executor(executor, run_there, within_time(tasks), run_here)
+    waiting = within_time(tasks)
+    if executor is not None:
+        maximum = TASKS_PER_WORKER * worker_count(executor)
+        yield from _run_by(lambda _, task: executor.submit(run_there, task), maximum, BadInput, waiting, run_here)
+        return
+    first_tasks = list(islice(waiting, 2 if threads > 1 else 0))
+    waiting = chain(first_tasks, waiting)
+    if len(first_tasks) < 2:  # one task needs no other thread
+        for k, task in waiting:
+            yield k, run_here(k, task)
+        return
+    with ThreadPoolExecutor(threads, thread_name_prefix="planar") as pool:
+        maximum = TASKS_PER_WORKER * threads
+        yield from _run_by(
+            lambda k, task: pool.submit(copy_context().run, run_here, k, task),
+            maximum,
+            BaseException,
+            waiting,
+            run_here,
+        )
 
 
-def run_in_executor(
-    executor: Executor,
-    function: Callable[[Task], Result],
-    tasks: Iterable[tuple[int, Task]],
+def _run_by(
+    submit: Callable[[int, Task], Future[Result]],
+    maximum: int,
+    raised: type[BaseException],
+    waiting: Iterator[tuple[int, Task]],
     run_here: Callable[[int, Task], Result],
 ) -> Iterator[tuple[int, Result]]:
-    """The same by an executor that calls `function` of a task; if a task is lost, `run_here` is called with its number
-    and the task.
-
-    Exceptions of the executor are not raised, as this process can run its tasks; a BadInput of a task is raised.
-    """
-    waiting, lost = iter(tasks), list[tuple[int, Task, int]]()
+    """Yield the numbers and results of tasks, of which at most `maximum` are submitted at a time; `raised` is the type
+    of the exceptions of tasks that are raised."""
+    fresh, lost = ((k, task, 0) for k, task in waiting), list[tuple[int, Task, int]]()
     running: dict[Future[Result], tuple[int, Task, int]] = {}
-    maximum = TASKS_PER_WORKER * worker_count(executor)
     try:
         while True:
-            while len(running) < maximum:
-                following = lost.pop() if lost else next(((k, task, 0) for k, task in waiting), None)
-                if following is None:
-                    break
+            while len(running) < maximum and (following := lost.pop() if lost else next(fresh, None)):
                 k, task, tries = following
-                future = _submit(executor, function, task) if tries < MAX_EXECUTOR_TRIES else None
+                future = None
+                if tries < MAX_EXECUTOR_TRIES:
+                    with suppress(Exception):  # an executor takes no more, as when its workers have been killed
+                        future = submit(k, task)
                 if future is None:
                     yield k, run_here(k, task)
                 else:
@@ -124,8 +109,8 @@ def run_in_executor(
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 k, task, tries = running.pop(future)
-                problem = future.exception() if not future.cancelled() else None
-                if isinstance(problem, BadInput):
+                problem = None if future.cancelled() else future.exception()
+                if isinstance(problem, raised):
                     raise problem
                 if future.cancelled() or problem is not None:
                     lost.append((k, task, tries))
@@ -145,11 +130,3 @@ def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[Result]:
         while following in early:
             yield early.pop(following)
             following += 1
-
-
-def _submit(executor: Executor, function: Callable[[Task], Result], task: Task) -> Future[Result] | None:
-    """Submit a task; None if the executor takes no more, as when its workers have been killed."""
-    try:
-        return executor.submit(function, task)
-    except Exception:  # this process can run the task, whatever an executor raises
-        return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -40,8 +40,7 @@ class SolvedDesign(NamedTuple):
 
 
 class DesignQuestion(NamedTuple):
-    """A design by its numbers, and the arguments of `solve_design`, or of `solve_timed_design` where it has a duration
-    (s); its text says why the design ends."""
+    """A design by its numbers, and the arguments of `solve_design`; its text says why the design ends."""
 
     mechanism: Mechanism
     values: Mapping[str, float]
@@ -54,12 +53,62 @@ class DesignQuestion(NamedTuple):
     def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:
         """See `solve_design`."""
         design = with_design_values(self.mechanism, self.values)
-        if self.duration is not None:
-            return solve_timed_design(design, self.duration, self.steps, points, rates)
-        return solve_design(design, self.pair, self.grid, self.steps, self.range, points, rates)
+        return solve_design(design, self.pair, self.grid, self.steps, self.range, points, rates, self.duration)
 
     def __str__(self) -> str:
         return str(self.solve((), False).message)
+
+
+class GridMotion(NamedTuple):
+    """The motion of one design (None where there is none), the positions of the running input in its rows, or their
+    times (s), how many of the rows are on the grid, the status of every row, and the reason of its end."""
+
+    motion: Motion | None
+    position: Array
+    row_count: int
+    status: Array
+    message: str | NoAnswer
+
+
+def run_design(
+    mechanism: Mechanism,
+    pair: str,
+    grid: Array | None,
+    steps: int,
+    range_: tuple[float | None, float | None],
+    duration: float | None = None,
+) -> GridMotion:
+    """Run a design over a grid of positions (rows,) of its running input, or, without one, over its own range.
+
+    `range_` is the start and the stop of the cycle. With a `duration` (s) all its inputs run by their laws or rates,
+    and the grid is the times. Does not raise NoAnswer: the status contains it.
+    """
+    status = np.zeros(steps + 1, dtype=np.int8)
+
+    def without_motion(outcome: Outcome, message: str | NoAnswer) -> GridMotion:
+        status[:] = OUTCOMES.index(outcome)
+        return GridMotion(None, np.zeros(0), 0, status, message)
+
+    reason = time_is_over()
+    if reason:
+        return without_motion(Outcome.INTERRUPTED, reason)
+    try:
+        run = (*range_, pair) if duration is None else ()
+        motion = cycle(mechanism, steps, *run, duration=duration)
+    except NoAnswer as problem:
+        return without_motion(problem.outcome, problem.with_traceback(None))  # its sentence takes long to make
+    except (BadInput, PointPlacementError) as problem:
+        return without_motion(Outcome.CANNOT_BE_ASSEMBLED, str(problem))
+    position = motion.time if duration is not None else None
+    if position is None:
+        position = motion.inputs[pair].position
+    row_count = min(len(position), steps + 1)
+    if grid is not None:
+        distance = np.abs(position[:row_count] - grid[:row_count])
+        is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
+        row_count = int(np.argmax(is_off)) if is_off.any() else row_count
+    status[row_count:] = OUTCOMES.index(motion.outcome)
+    return GridMotion(motion, position, row_count, status, motion.reason if row_count <= steps else "")
 
 
 def solve_design(
@@ -70,102 +119,26 @@ def solve_design(
     range_: tuple[float | None, float | None],
     points: tuple[PointName, ...],
     rates: bool,
+    duration: float | None = None,
 ) -> SolvedDesign:
-    """Solve a design over a grid of positions (rows,) of its running input, or, without one, over its own range.
-
-    `range_` is the start and the stop of the cycle. Does not raise NoAnswer: the status contains it.
-    """
-
-    def run() -> tuple[Motion, Array]:
-        motion = cycle(mechanism, steps, *range_, pair)
-        return motion, motion.inputs[pair].position
-
-    return _solve(run, grid, steps, points, rates)
-
-
-def solve_timed_design(
-    mechanism: Mechanism, duration: float, steps: int, points: tuple[PointName, ...], rates: bool
-) -> SolvedDesign:
-    """Solve a design in time, all its inputs by their laws or rates: as `solve_design`, but `input` is the times (s),
-    and no position of one input ends it."""
-
-    def run() -> tuple[Motion, Array]:
-        motion = cycle(mechanism, steps, duration=duration)
-        assert motion.time is not None
-        return motion, motion.time
-
-    solved = _solve(run, np.linspace(0.0, duration, steps + 1), steps, points, rates)
-    return solved._replace(dead_point=np.nan, stop_position=np.nan)
-
-
-class GridMotion(NamedTuple):
-    """The motion of one design (None where there is none), how many of its rows are on the grid, the status of every
-    row, and the reason of its end."""
-
-    motion: Motion | None
-    many: int
-    status: Array
-    message: str | NoAnswer
-
-
-def run_design(mechanism: Mechanism, pair: str, grid: Array) -> GridMotion:
-    """The motion of a design over a grid of positions (rows,) of its running input. Does not raise NoAnswer."""
-
-    def run() -> tuple[Motion, Array]:
-        motion = cycle(mechanism, len(grid) - 1, float(grid[0]), float(grid[-1]), pair)
-        return motion, motion.inputs[pair].position
-
-    return _run_on_grid(run, grid, len(grid) - 1)[0]
-
-
-def _run_on_grid(
-    run: Callable[[], tuple[Motion, Array]], grid: Array | None, steps: int
-) -> tuple[GridMotion, Array | None]:
-    """Run a motion; return it with the number of rows that are on the grid (all without a grid), and the positions of
-    its rows."""
-    status = np.zeros(steps + 1, dtype=np.int8)
-    reason = time_is_over()
-    if reason:
-        status[:] = OUTCOMES.index(Outcome.INTERRUPTED)
-        return GridMotion(None, 0, status, reason), None
-    try:
-        motion, position = run()
-    except NoAnswer as problem:
-        status[:] = OUTCOMES.index(problem.outcome)
-        return GridMotion(None, 0, status, problem.with_traceback(None)), None  # its sentence takes long to make
-    except (BadInput, PointPlacementError) as problem:
-        status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
-        return GridMotion(None, 0, status, str(problem)), None
-    row_count = min(len(position), steps + 1)
-    if grid is not None:
-        distance = np.abs(position[:row_count] - grid[:row_count])
-        is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
-        row_count = int(np.argmax(is_off)) if is_off.any() else row_count
-    status[row_count:] = OUTCOMES.index(motion.outcome)
-    return GridMotion(motion, row_count, status, motion.reason if row_count <= steps else ""), position
-
-
-def _solve(
-    run: Callable[[], tuple[Motion, Array]],
-    grid: Array | None,
-    steps: int,
-    points: tuple[PointName, ...],
-    rates: bool,
-) -> SolvedDesign:
-    """The rows of a motion on a grid (rows,), or on its own; `run` returns the motion, and the positions of its
-    rows."""
+    """Solve a design, see `run_design`; without a grid `input` is where its own range has the running input."""
+    if duration is not None:
+        grid = np.linspace(0.0, duration, steps + 1)
+    motion, position, row_count, status, message = run_design(mechanism, pair, grid, steps, range_, duration)
     out = np.full((steps + 1, 2 * len(points) * (3 if rates else 1)), np.nan)
-    input_ = np.full(steps + 1, np.nan) if grid is None else grid
-    (motion, row_count, status, message), position = _run_on_grid(run, grid, steps)
-    if motion is None or position is None:
-        return SolvedDesign(input_, out, status, message)
     if grid is None:
-        input_[: len(position)] = position[: steps + 1]
+        grid = np.full(steps + 1, np.nan)
+        grid[: len(position)] = position[: steps + 1]
+    if motion is None:
+        return SolvedDesign(grid, out, status, message)
     out[:row_count] = point_rows(motion, points, rates)[:row_count]
-    remark = "; ".join(motion.rate_remarks) if rates else ""
-    last = float(position[-1]) if row_count <= steps else np.nan
-    ends = (last if motion.outcome is outcome else np.nan for outcome in (Outcome.DEAD_POINT, Outcome.STOP))
-    return SolvedDesign(input_, out, status, message, remark, *ends)
+    solved = SolvedDesign(grid, out, status, message, "; ".join(motion.rate_remarks) if rates else "")
+    if duration is not None or row_count > steps:
+        return solved
+    last = float(position[-1])
+    if motion.outcome is Outcome.DEAD_POINT:
+        return solved._replace(dead_point=last)
+    return solved._replace(stop_position=last) if motion.outcome is Outcome.STOP else solved
 
 
 def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:

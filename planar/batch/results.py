@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,6 +48,15 @@ class SweepNotes(NamedTuple):
 
 def _describe_ending(outcome: Outcome) -> str:
     return "rates are missing or have few digits" if outcome is Outcome.SOLVED else outcome.value
+
+
+def add_ending_counts(blocks: Iterable[Iterable[tuple[int, int, Any]]]) -> dict[int, tuple[int, Any]]:
+    """By the code of each outcome how many designs of all blocks ended so, and what is said of the first."""
+    totals: dict[int, tuple[int, Any]] = {}
+    for code, count, sentence in chain.from_iterable(blocks):
+        previous, first = totals.get(code, (0, sentence))
+        totals[code] = previous + count, first
+    return totals
 
 
 @dataclass(frozen=True)

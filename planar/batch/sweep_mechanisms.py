@@ -5,34 +5,45 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
+from operator import length_hint
+from os import PathLike
 from typing import overload
 
-import numpy as np
 from numpy.typing import DTypeLike
 
 from planar.batch.executor import in_order, run_tasks, thread_count
+from planar.batch.general_path import OUTCOMES
 from planar.batch.mechanisms.linkages import SweepRequest
 from planar.batch.mechanisms.part_runs import solve_part
-from planar.batch.mechanisms.parts import (
-    PART_SIZE,
-    PartRuns,
-    check_inputs,
-    end_message,
-    find_endings,
-    part_messages,
-    read_mechanisms,
-)
 from planar.batch.mechanisms.pins import result_pins
-from planar.batch.mechanisms.results import Each, SweptPart, join_parts
+from planar.batch.mechanisms.results import Each, SweptPart
 from planar.batch.mechanisms.tape_runs import make_values
-from planar.batch.reductions.reduced_sweep import ReducedSweep, Reduction, result_type, sweep_reduced
+from planar.batch.reductions.reduced_sweep import (
+    ReducedBlock,
+    ReducedSweep,
+    Reduction,
+    join_blocks,
+    read_reductions,
+    reduce_all,
+    result_type,
+)
+from planar.batch.results import add_ending_counts
 from planar.batch.sweep import warn_of_backend
+from planar.document.files import as_mechanism
 from planar.document.first_argument import MechanismSource
+from planar.foundation.arrays import Array, part_offsets
 from planar.foundation.errors import BadInput
-from planar.foundation.time_limit import returns_part_in_time, time_is_over
-from planar.model.mechanism import Mechanism
+from planar.foundation.time_limit import interrupted, report_progress, returns_part_in_time, time_is_over
+from planar.model.mechanism import Mechanism, running_input_index
+from planar.model.pin_linkage import PinnedMechanism
 from planar.model.pin_linkages import PinnedLinkages
 from planar.model.run_arguments import check_steps
+from planar.model.wording import count_phrase
+
+PART_SIZE = 512
+"""Number of mechanisms that a thread or an executor solves together."""
+Part = list[Mechanism] | PinnedLinkages
+_SolvedPart = tuple[SweptPart | ReducedBlock, int, set[str]]
 
 
 @overload
@@ -123,50 +134,135 @@ def sweep_each(  # many: the public signature; # long: its docstring
     step_count, threads, number_type = check_steps(steps), thread_count(workers, executor), result_type(dtype)
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
     warn_of_backend(backend, "sweep_each", 4)
-    request = SweepRequest(step_count, names, rates, pair)
-    runs = PartRuns(threads, executor, number_type, progress)
+    parts: Iterable[Part] = _read_parts(mechanisms, pair)
+    count, functions = length_hint(mechanisms, 0), None
     if reduce is not None:
-        return sweep_reduced(mechanisms, request, runs, reduce)
-    if not isinstance(mechanisms, PinnedLinkages) or pair is not None:
-        mechanisms = read_mechanisms(mechanisms)
-        check_inputs(mechanisms, pair)
-    parts = list(_sweep_parts(mechanisms, request, runs))
-    general = [swept for part in parts for swept in part.general.values()]
-    done = sum(map(len, parts))
-    messages = part_messages([find_endings(part) for part in parts], done, len(general))
-    reason = time_is_over() if done < len(mechanisms) else ""
-    positions = sum(int(np.sum(swept.status == 0)) for swept in general)
-    return Each(tuple(parts), positions, len(general), (*end_message(done, reason), *messages), reason=reason)
+        reductions = read_reductions(reduce, str, step_count)
+        for measure in reductions.measures:
+            if not measure.is_of_point:
+                raise BadInput("reduce", f"mechanisms tell points alone, not {measure.name}.{measure.quantity}")
+        functions, (names, rates) = reductions.functions, reductions.with_points(names, rates)
+    request = SweepRequest(step_count, names, rates, pair)
+    values, first_rows = None, part_offsets([])
+    if reduce is None:
+        parts = list(parts)
+        count = sum(map(len, parts))
+        linkages = [part for part in parts if isinstance(part, PinnedLinkages)]
+        if linkages and len(linkages) == len(parts) and executor is None:  # all points in one array
+            first_rows = part_offsets([result_pins(part, names).first[-1] for part in linkages])
+            values = make_values(int(first_rows[-1]), step_count, rates, number_type)
 
+    started = 0
 
-def _sweep_parts(
-    mechanisms: list[Mechanism] | PinnedLinkages, request: SweepRequest, runs: PartRuns
-) -> Iterator[SweptPart]:
-    """Mechanisms part after part. Linkages that are arrays have all their points in one array, unless an executor has
-    solved them."""
-    count, values = len(mechanisms), None
-    if isinstance(mechanisms, PinnedLinkages) and runs.executor is None:
-        first = result_pins(mechanisms, request.points).first
-        values = make_values(int(first[-1]), request.steps, request.rates, runs.dtype)
-    bounds = [(k, min(k + PART_SIZE, count)) for k in range(0, count, PART_SIZE)]
-    tasks = ((k, mechanisms[a:b] if b - a < count else mechanisms) for k, (a, b) in enumerate(bounds))
+    def tasks() -> Iterator[tuple[int, Part]]:
+        nonlocal started
+        for part in parts:
+            started += 1
+            yield started - 1, part
 
-    def solve_here(k: int, part: list[Mechanism] | PinnedLinkages) -> SweptPart:
-        a, b = bounds[k]
-        return solve_part(part, request, runs.dtype, None if values is None else values[first[a] : first[b]])
+    def solve_here(k: int, part: Part) -> _SolvedPart:
+        target = None if values is None else values[first_rows[k] : first_rows[k + 1]]
+        return _solve_part(part, request, number_type, functions, target)
 
-    solve_there = partial(solve_part, request=request, dtype=runs.dtype)
-    parts: list[SweptPart] = []
-    done, missing = 0, set(request.points or ())
-    for part in in_order(run_tasks(runs.threads, runs.executor, solve_there, tasks, solve_here)):
-        parts.append(part)
-        done += len(part)
-        missing -= part.present_points(missing)
-        runs.report(done, count)
-    for name in request.points or ():
-        if name in missing and count and done == count:
+    solve_there = partial(_solve_part, request=request, dtype=number_type, functions=functions)
+    results: list[SweptPart | ReducedBlock] = []
+    done, missing = 0, set(names or ())
+    for result, part_count, present in in_order(run_tasks(threads, executor, solve_there, tasks(), solve_here)):
+        results.append(result)
+        missing -= present
+        done += part_count
+        report_progress(done, max(done, count))
+        if progress is not None:
+            progress(done, max(done, count))
+    reason = time_is_over() if started > len(results) else ""
+    if functions is not None and reason and not results:
+        raise interrupted(reason, "before a mechanism was reduced")
+    for name in names or ():
+        if name in missing and done and not reason:
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
-    if values is None:
-        yield from parts
-    elif parts:
-        yield join_parts(parts, values[: first[done]])
+    messages = _messages(results, done, reason)
+    if functions is not None:
+        blocks = [block for block in results if isinstance(block, ReducedBlock)]
+        return ReducedSweep({}, *join_blocks(blocks), messages)
+    swept = tuple(part for part in results if isinstance(part, SweptPart))
+    positions, general = sum(part.general_positions for part in swept), sum(part.general_designs for part in swept)
+    values = None if values is None else values[: first_rows[len(swept)]]
+    return Each(swept, values, positions, general, messages, reason=reason)
+
+
+def _solve_part(
+    part: Part,
+    request: SweepRequest,
+    dtype: str,
+    functions: Mapping[str, Reduction[Each]] | None,
+    values: Array | None = None,
+) -> _SolvedPart:
+    """Solve some mechanisms, and reduce them if there are reductions: the result, how many mechanisms there are, and
+    which of the points of the request are present."""
+    solved = solve_part(part, request, dtype if functions is None else "float64", values)
+    result: SweptPart | ReducedBlock = solved
+    if functions is not None:
+        counts = solved.general_positions, solved.general_designs
+        reduced = reduce_all(Each((solved,), None, *counts, ()), functions, dtype)
+        result = ReducedBlock(reduced, solved.last_status, *counts, solved.ending_counts)
+    return result, len(solved), solved.present_points(request.points or ())
+
+
+def _read_parts(sources: Iterable[MechanismSource | PinnedLinkages], pair: str | None) -> Iterator[Part]:
+    """Yield mechanisms part by part, read when they are needed; each file or model once in a part. Raises BadInput."""
+    if isinstance(sources, PinnedLinkages):
+        sources = [sources]
+    elif isinstance(sources, str | PathLike | Mechanism) or not isinstance(sources, Iterable):
+        raise BadInput("mechanisms", f"a list of mechanisms is wanted, not {type(sources).__name__} {sources!r:.40}")
+    done, waiting, files = 0, list[Mechanism](), dict[str | PathLike[str], Mechanism]()
+    for source in sources:
+        if isinstance(source, PinnedLinkages) and pair is None:
+            if waiting:
+                yield waiting
+            yield from (source[k : k + PART_SIZE] for k in range(0, len(source), PART_SIZE))
+            done, waiting = done + len(waiting) + len(source), []
+            continue
+        for item in source if isinstance(source, PinnedLinkages) else (source,):
+            waiting.append(_read_mechanism(item, f"mechanisms[{done + len(waiting)}]", pair, files))
+            if len(waiting) == PART_SIZE:
+                yield waiting
+                done, waiting = done + PART_SIZE, []
+                files.clear()
+    if waiting:
+        yield waiting
+
+
+def _read_mechanism(
+    source: MechanismSource, place: str, pair: str | None, files: dict[str | PathLike[str], Mechanism]
+) -> Mechanism:
+    """A mechanism with an input that runs; `files` are those that have been read. Raises BadInput."""
+    if isinstance(source, PinnedMechanism) and pair is None and source.layout is not None:
+        return source
+    if isinstance(source, str | PathLike):
+        if source not in files:
+            files[source] = as_mechanism(source)
+        source = files[source]
+    if not isinstance(source, Mechanism):
+        raise BadInput(place, f"a mechanism is wanted, not {source!r:.40}")
+    running_input_index(source, pair, place)
+    return source
+
+
+def _messages(results: Sequence[SweptPart | ReducedBlock], count: int, reason: str) -> tuple[str, ...]:
+    """The messages about `count` mechanisms; `reason`: why the sweep ended early, empty where it did not."""
+    messages = []
+    if reason:
+        messages.append(f"{reason} after {count_phrase(count, 'mechanism')}: the others are left out")
+    general = sum(result.general_designs for result in results)
+    if general:
+        messages.append(f"the general path solved {general} of {count_phrase(count, 'mechanism')}, one after the other")
+    totals = add_ending_counts(result.ending_counts for result in results)
+    without_rates = totals.pop(0, None)
+    messages += [
+        f"{count_phrase(ended, 'mechanism')}: {OUTCOMES[code].value}; {first}"
+        for code, (ended, first) in totals.items()
+    ]
+    if without_rates:
+        ended, first = without_rates
+        messages.append(f"{count_phrase(ended, 'mechanism')}: rates are missing or have few digits; {first}")
+    return tuple(messages)

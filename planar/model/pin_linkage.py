@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cached_property, lru_cache
+from itertools import chain
 from math import atan2, hypot, isfinite
 from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.errors import BadInput
 from planar.model.file_units import FileUnits
 from planar.model.link_shapes import At, Link, Point
@@ -46,40 +47,42 @@ def pinned(
     >>> planar.pinned(places, [(0, 1), (1, 2), (2, 3)], [0, 3], name="Bars")
     <Mechanism 'Bars': 4 links, 4 pairs, driven at P0>
     """
-    at, lists = _read_positions(places), _read_bars(bars)
-    numbers = at.tolist()
-    fixed = tuple(dict.fromkeys(_check_pin(pin, f"frame[{k}]", len(at)) for k, pin in enumerate(frame)))
+    positions, lists, fixed = _read_positions(places), _read_bars(bars), list(frame)
+    numbers = positions.tolist()
     if not fixed:
         raise BadInput("frame", "no pin is on the frame")
-    if isinstance(crank, bool) or not isinstance(crank, Integral) or not 0 <= crank < len(lists):
+    if isinstance(crank, bool) or not isinstance(crank, int | Integral) or not 0 <= crank < len(lists):
         raise BadInput("crank", f"the number of a bar is wanted, of which there are {len(lists)}, not {crank!r:.40}")
     for key, rate in (("velocity", velocity), ("acceleration", acceleration)):
-        if isinstance(rate, bool) or not isinstance(rate, Real) or not isfinite(rate):
+        if isinstance(rate, bool) or not isinstance(rate, float | Real) or not isfinite(rate):
             raise BadInput(key, f"a finite number is wanted, not {rate!r:.40}")
-    flat = [pin for bar in lists for pin in bar]
-    held = {*flat, *fixed}
-    plain = set(map(type, flat)) == {int} and min(flat) >= 0 and max(flat) < len(at) and all(len(b) == 2 for b in lists)
-    if not plain or len(set(map(tuple, numbers))) < len(numbers):
-        for k, bar in enumerate(lists):
-            _check_bar(k, bar, numbers)
-    for pin in range(len(at)):
-        if pin not in held:
-            raise BadInput(f"places[{pin}]", f"pin {pin} is on no bar, and not on the frame")
+    pins = [*fixed, *chain.from_iterable(lists)]
+    # most linkages have bars of two pins, whose numbers are whole numbers of Python's own
+    if set(map(len, lists)) != {2} or set(map(type, pins)) != {int} or min(pins) < 0 or max(pins) >= len(numbers):
+        fixed = [_check_pin(pin, f"frame[{k}]", len(numbers)) for k, pin in enumerate(fixed)]
+        lists = [_check_bar(k, bar, numbers) for k, bar in enumerate(lists)]
+        pins = [*fixed, *chain.from_iterable(lists)]
+    else:
+        for k, (first, second) in enumerate(lists):
+            if numbers[first] == numbers[second]:
+                _check_bar(k, lists[k], numbers)
+    used = set(pins)
+    if len(used) < len(numbers):
+        pin = next(pin for pin in range(len(numbers)) if pin not in used)
+        raise BadInput(f"places[{pin}]", f"pin {pin} is on no bar, and not on the frame")
     on = [pin for pin in lists[crank] if pin in fixed]
     if len(on) != 1:
-        told = "is not pinned to the frame" if not on else "is pinned to the frame twice, so it cannot turn"
-        raise BadInput("crank", f"bar {crank} {told}")
-    return PinnedMechanism.from_layout(
-        name, PinLayout(at, numbers, lists, fixed, int(crank), float(velocity), float(acceleration))
-    )
+        problem = "is not pinned to the frame" if not on else "is pinned to the frame twice, so it cannot turn"
+        raise BadInput("crank", f"bar {crank} {problem}")
+    frame_pins, rates = tuple(dict.fromkeys(fixed)), (float(velocity), float(acceleration))
+    return PinnedMechanism.from_layout(name, PinLayout(positions, lists, frame_pins, int(crank), *rates))
 
 
 class PinLayout(NamedTuple):
-    """A pinned linkage as numbers: places (pins, 2), also as lists; the pins of every bar; those on the frame."""
+    """A pinned linkage as numbers: places (pins, 2); the pins of every bar; those on the frame."""
 
     pin_positions: Array
-    position_lists: list[list[float]]
-    bars: list[list[int]]
+    bars: list[tuple[int, ...]]
     frame_pins: tuple[int, ...]
     crank: int
     velocity: float
@@ -88,7 +91,7 @@ class PinLayout(NamedTuple):
     @property
     def crank_angle(self) -> float:
         """The angle of the crank (rad)."""
-        (ax, ay), (bx, by) = (self.position_lists[pin] for pin in self.bars[self.crank][:2])
+        (ax, ay), (bx, by) = (self.pin_positions[pin].tolist() for pin in self.bars[self.crank][:2])
         return atan2(by - ay, bx - ax)
 
 
@@ -113,8 +116,9 @@ class PinnedMechanism(Mechanism):
     def links(self) -> tuple[Link, ...]:
         """The frame, then the bars."""
         laid = self._checked_layout
-        frame = Link(FRAME_NAME, tuple([Point(f"P{pin}", At(*laid.position_lists[pin])) for pin in laid.frame_pins]))
-        return (frame, *[_bar_link(f"bar{k}", bar, laid.position_lists) for k, bar in enumerate(laid.bars)])
+        positions = laid.pin_positions.tolist()
+        frame = Link(FRAME_NAME, tuple([Point(f"P{pin}", At(*positions[pin])) for pin in laid.frame_pins]))
+        return (frame, *[_bar_link(f"bar{k}", bar, positions) for k, bar in enumerate(laid.bars)])
 
     @cached_property
     def pairs(self) -> tuple[Pair, ...]:
@@ -141,13 +145,13 @@ class PinnedMechanism(Mechanism):
         """Where the pins are that move."""
         laid = self._checked_layout
         fixed = set(laid.frame_pins)
-        return tuple([(f"P{pin}", x, y) for pin, (x, y) in enumerate(laid.position_lists) if pin not in fixed])
+        return tuple([(f"P{pin}", x, y) for pin, (x, y) in enumerate(laid.pin_positions.tolist()) if pin not in fixed])
 
     @cached_property
     def _links_on_pins(self) -> list[list[str]]:
         """The links on every pin, the frame first."""
         laid = self._checked_layout
-        holding: list[list[str]] = [[] for _ in laid.position_lists]
+        holding: list[list[str]] = [[] for _ in laid.pin_positions]
         for pin in laid.frame_pins:
             holding[pin].append(FRAME_NAME)
         for k, bar in enumerate(laid.bars):
@@ -172,17 +176,17 @@ def _read_positions(places: Any) -> Array:
         raise BadInput("places", "an array (pins, 2) of numbers (m) is wanted") from None
     if at.ndim != 2 or at.shape[1] != 2 or len(at) < 2:
         raise BadInput("places", "an array (pins, 2) is wanted, of two pins at least")
-    if not np.abs(at).max() <= LARGEST_INPUT_POSITION:
+    if not greatest_size(at) <= LARGEST_INPUT_POSITION:
         k = int(np.argmin(np.all(np.abs(at) <= LARGEST_INPUT_POSITION, axis=1)))
         raise BadInput(f"places[{k}]", f"numbers up to {LARGEST_INPUT_POSITION:g} m are wanted, not {at[k].tolist()}")
     at.flags.writeable = False
     return at
 
 
-def _read_bars(bars: Any) -> list[list[int]]:
+def _read_bars(bars: Any) -> list[tuple[int, ...]]:
     """The pins of every bar."""
     try:
-        return bars.tolist() if hasattr(bars, "tolist") else [list(bar) for bar in bars]
+        return list(map(tuple, bars.tolist() if hasattr(bars, "tolist") else bars))
     except TypeError:
         raise BadInput("bars", "lists of pin numbers are wanted, one for each bar") from None
 
@@ -193,13 +197,14 @@ def _check_pin(pin: Any, place: str, many: int) -> int:
     return int(pin)
 
 
-def _check_bar(number: int, bar: list[int], at: Sequence[Sequence[float]]) -> None:
-    """Refuse a bar that is none; its pins become whole numbers of Python's own."""
-    bar[:] = [_check_pin(pin, f"bars[{number}][{k}]", len(at)) for k, pin in enumerate(bar)]
+def _check_bar(number: int, bar: Sequence[int], at: Sequence[Sequence[float]]) -> tuple[int, ...]:
+    """The pins of a bar, whole numbers of Python's own. Raises BadInput for a bar that is none."""
+    bar = tuple([_check_pin(pin, f"bars[{number}][{k}]", len(at)) for k, pin in enumerate(bar)])
     if len(bar) < 2 or len(set(bar)) < len(bar):
         raise BadInput(f"bars[{number}]", "two pins or more are wanted, each once")
     if at[bar[0]] == at[bar[1]]:
         raise BadInput(f"bars[{number}]", f"pins {bar[0]} and {bar[1]} are at one place, so the bar has no length")
+    return bar
 
 
 def _bar_link(own: str, bar: Sequence[int], at: Sequence[Sequence[float]]) -> Link:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, overload
 
 import numpy as np
@@ -102,18 +102,19 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
     @classmethod
     def from_layouts(cls, layouts: Sequence[PinLayout]) -> PinnedLinkages:
         """Linkages that have been checked."""
-        bars = [bar for each in layouts for bar in each.bars]
+        positions, bars, frames, cranks, velocities, accelerations = zip(*layouts, strict=True)
+        all_bars = list(chain.from_iterable(bars))
         return cls(
-            np.concatenate([each.pin_positions for each in layouts]),
-            part_offsets([len(each.position_lists) for each in layouts]),
-            np.array([pin for bar in bars for pin in bar]),
-            part_offsets([len(bar) for bar in bars]),
-            part_offsets([len(each.bars) for each in layouts]),
-            np.array([pin for each in layouts for pin in each.frame_pins]),
-            part_offsets([len(each.frame_pins) for each in layouts]),
-            np.array([each.crank for each in layouts]),
-            np.array([each.velocity for each in layouts]),
-            np.array([each.acceleration for each in layouts]),
+            np.concatenate(positions),
+            part_offsets(list(map(len, positions))),
+            np.array(list(chain.from_iterable(all_bars))),
+            part_offsets(list(map(len, all_bars))),
+            part_offsets(list(map(len, bars))),
+            np.array(list(chain.from_iterable(frames))),
+            part_offsets(list(map(len, frames))),
+            np.array(cranks),
+            np.array(velocities),
+            np.array(accelerations),
         )
 
     @property
@@ -143,19 +144,17 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
             begin, end, by = index.indices(len(self))
             if by != 1:
                 raise BadInput("linkages", "linkages that follow one another are wanted")
-            return self._part(begin, max(begin, end))
+            return self if end - begin == len(self) else self._part(begin, max(begin, end))
         if not -len(self) <= index < len(self):
             raise IndexError(f"there are {len(self)} linkages, and no number {index}")
         own = self._part(index % len(self), index % len(self) + 1)
         entries = own.bar_pins.tolist()
         ends = own.first_entry.tolist()
-        bars = [entries[a:b] for a, b in pairwise(ends)]
+        bars = [tuple(entries[a:b]) for a, b in pairwise(ends)]
         positions = own.positions.copy()
         positions.flags.writeable = False
         rates = float(own.velocity[0]), float(own.acceleration[0])
-        layout = PinLayout(
-            positions, positions.tolist(), bars, tuple(own.frame_pins.tolist()), int(own.crank[0]), *rates
-        )
+        layout = PinLayout(positions, bars, tuple(own.frame_pins.tolist()), int(own.crank[0]), *rates)
         return PinnedMechanism.from_layout("", layout)
 
     def _part(self, begin: int, end: int) -> PinnedLinkages:

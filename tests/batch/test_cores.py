@@ -7,7 +7,7 @@ import pytest
 
 import planar
 from planar.batch import executor
-from planar.batch.executor import run_in_executor, run_in_threads, usable_cores
+from planar.batch.executor import run_tasks, usable_cores
 from planar.batch.reductions.point_reductions import fourier_descriptors
 from planar.foundation.errors import BadInput
 from planar.foundation.turns import leave_turn, take_turn
@@ -77,7 +77,7 @@ def test_tasks_are_taken_one_after_the_other_as_threads_are_free():
             taken.append(k)
             yield k, k
 
-    for k, found in run_in_threads(2, tasks(), lambda _, task: task * task):
+    for k, found in run_tasks(2, None, None, tasks(), lambda _, task: task * task):
         assert found == k * k
         done.append(k)
         assert len(taken) <= len(done) + 2 * executor.TASKS_PER_WORKER + 1
@@ -90,14 +90,14 @@ def test_what_a_task_raises_is_raised(threads):
         raise KeyError(task)
 
     with pytest.raises(KeyError, match="lost"):
-        list(run_in_threads(threads, [(0, "lost"), (1, "lost")], fail))
+        list(run_tasks(threads, None, None, [(0, "lost"), (1, "lost")], fail))
 
 
 def test_an_executor_is_given_no_more_tasks_than_it_can_hold():
     taken = []
     tasks = ((k, taken.append(k) or k) for k in range(12))
     with ThreadPoolExecutor(1) as pool:
-        next(run_in_executor(pool, str, tasks, lambda _, task: str(task)))
+        next(run_tasks(1, pool, str, tasks, lambda _, task: str(task)))
     assert len(taken) <= executor.TASKS_PER_WORKER
 
 
@@ -115,7 +115,7 @@ def test_a_turn_is_one_threads_at_a_time_and_another_goes_on_where_it_is_left():
         with leave_turn():
             return number
 
-    assert sorted(k for k, _ in run_in_threads(4, ((k, k) for k in range(40)), work)) == list(range(40))
+    assert sorted(k for k, _ in run_tasks(4, None, None, ((k, k) for k in range(40)), work)) == list(range(40))
     assert set(most) == {1}
 
 
@@ -288,9 +288,9 @@ def test_reductions_rounded_and_elsewhere(pool):
 
 
 def test_mechanisms_are_taken_as_they_are_needed_and_only_reductions_are_kept(monkeypatch):
-    from planar.batch.mechanisms import parts
+    from planar.batch import sweep_mechanisms
 
-    monkeypatch.setattr(parts, "PART_SIZE", 4)
+    monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 4)
     taken, told = [], []
 
     def mechanisms():

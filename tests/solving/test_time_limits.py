@@ -138,7 +138,6 @@ def small(monkeypatch):
         monkeypatch.setattr(f"planar.synthesis.synthesise.{name}", value)
     monkeypatch.setattr("planar.structures.linkage_store.BLOCK_SIZE", 5)
     monkeypatch.setattr("planar.batch.sweep_mechanisms.PART_SIZE", 2)
-    monkeypatch.setattr("planar.batch.mechanisms.parts.PART_SIZE", 2)
 
 
 def outcome_of(result):

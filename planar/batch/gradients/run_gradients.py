@@ -232,14 +232,14 @@ class RunGradients:
         begin = float(mechanism.inputs[self.reference.running_index].position) if start is None else float(start)
         length = 2.0 * np.pi if stop is None else stop - begin
         grid = begin + length * np.linspace(0.0, 1.0, len(self._positions))
-        result = run_design(mechanism, self.reference.pair, grid)
+        result = run_design(mechanism, self.reference.pair, grid, len(grid) - 1, (float(grid[0]), float(grid[-1])))
         status: IntArray = np.array(result.status)
         value, total = 0.0, np.zeros(len(self.names))
-        if result.motion is not None and result.many:
+        if result.motion is not None and result.row_count:
             derived = SlopeSystem(result.motion, has_rates=self.rates).derive(
                 lambda part: self._weighted_results(weights.rows, part.kinematics.motion)
             )
-            solved = slice(result.many)
+            solved = slice(result.row_count)
             w: Array = np.stack([array[solved] for array in weights.arrays])
             coordinates: Array = np.stack([array[solved] for array in derived.values.values()])
             slopes: Array = np.stack([array[solved] for array in derived.slopes.values()])

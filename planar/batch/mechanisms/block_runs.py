@@ -1,116 +1,100 @@
-"""Run linkages that are partitioned into blocks: inputs, blocks and points of a linkage are blocks of one tape."""
+"""Runs of linkages that are partitioned into blocks, and their ends at stops of pairs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache, partial
-from typing import Any
+from collections.abc import Callable
+from functools import partial
 
-import casadi as ca
 import numpy as np
 
 from planar.batch.march.stops import SURE_DISTANCE, TURN
-from planar.batch.mechanisms.block_type import (
-    COS,
-    POSE_ROWS,
-    SIN,
-    TURN1,
-    TURN2,
-    X1,
-    X2,
-    Y1,
-    Y2,
-    BlockType,
-    X,
-    Y,
-    step_table,
-    write_formula,
-)
-from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, find_linkage_assemblies
-from planar.batch.mechanisms.linkages import LinkageArrays, PointArrays, SweepRequest, watched_links
+from planar.batch.mechanisms.block_tapes import make_block_kinds, make_tape, temporary_slots
+from planar.batch.mechanisms.initial_assembly import LinkageAssemblies
+from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, watched_links
 from planar.batch.mechanisms.results import PointTable, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
-    FIRST_ROOM_SLOT,
-    FRAME,
-    POINT_ROWS,
     STEP_TABLE,
-    TABLE,
-    TABLE_ANGLE,
-    TABLE_COS,
-    TABLE_SIN,
-    BlockKinds,
-    FineRun,
+    Endings,
     LinkageEnding,
-    PartRun,
-    TapedLinkages,
-    run_taped_linkages,
+    PreparedTape,
 )
 from planar.batch.named_results.design_frames import DesignFrames
-from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
-from planar.foundation.geometry import Vector
 from planar.model.mechanism import links_counting_turns, running_input_index
 from planar.solving.stops import PairStops
 
-RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
-"""Kinds of the blocks of a tape: types of blocks of links come last."""
-INPUT_NUMBERS = 5
-"""Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
 
+def prepare_blocks(
+    arrays: LinkageArrays, assemblies: LinkageAssemblies, points: PointTable, pair: str | None
+) -> PreparedTape:
+    """Prepare the tape of linkages that are solved block after block, with the input that runs at `pair`; `points` are
+    the results of the part.
 
-def run_blocks(arrays: LinkageArrays, points: PointTable, values: Array, run: PartRun, request: SweepRequest) -> None:
-    """Run linkages block after block; `points` says which are results, and their rows in values.
-
-    Behind these rows are those of the points of links that decide where pairs with stops are.
+    Behind their rows are those of the points of links that decide where pairs with stops are.
     """
-    is_sure, block_numbers = find_linkage_assemblies(arrays)
     results = arrays.points([points.names(k) for k in arrays.which.tolist()])
     first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
     rows = np.arange(len(results.owner)) + (points.first[arrays.which] - first_result[:-1])[results.owner]
     watched = arrays.watched_points
     first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
     rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
-    taped = _make_tape(arrays, block_numbers, results.followed_by(watched), rows).select(np.flatnonzero(is_sure))
+    tape_points = LinkArrays(
+        np.concatenate([results.owner, watched.owner]),
+        np.concatenate([results.link_index, watched.link_index]),
+        np.concatenate([results.numbers, watched.numbers]),
+    )
+    taped = make_tape(
+        arrays, assemblies.block_numbers, temporary_slots, [STEP_TABLE] * len(arrays.batches), tape_points, rows
+    ).select(np.flatnonzero(assemblies.is_sure))
     find_endings = {
-        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), request.pair)
+        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
     }
-    kinds = _block_kinds([batch.block_type for batch in arrays.batches], request.rates)
-    run_taped_linkages(taped, kinds, values, request.steps, run, find_endings)
-    is_dead = run.is_decided & (run.outcome == DEAD_POINT_NUMBER)
-    for k in np.flatnonzero(is_dead[arrays.which]).tolist():
-        number = int(arrays.which[k])
-        links = arrays.links_of_block(int(run.block[number]))
-        run.reasons[number] = dead_point_reason(links, arrays.start[k] + run.near[number])
+    types = [batch.block_type for batch in arrays.batches]
+    return PreparedTape(taped, partial(make_block_kinds, types), find_endings)
+
+
+def note_dead_links(arrays: LinkageArrays, endings: Endings) -> None:
+    """Note the reasons of linkages with blocks that come to a dead point."""
+    is_dead = (endings.solved >= 0) & (endings.outcome == DEAD_POINT_NUMBER)
+    for number in arrays.which[is_dead[arrays.which]].tolist():
+        links = arrays.links_of_block(int(endings.links[number, 0]))
+        endings.reasons[number] = dead_point_reason(links, endings.start[number] + endings.near[number])
 
 
 def _find_ending(
-    arrays: LinkageArrays, k: int, rows: IntArray, running_pair: str | None, run: FineRun
+    arrays: LinkageArrays,
+    k: int,
+    rows: IntArray,
+    running_pair: str | None,
+    rotation: Array,
+    point_places: Callable[[IntArray], Array],
+    good: int,
 ) -> LinkageEnding | None:
     """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
     sure."""
     mechanism, unit = arrays.mechanisms[k], float(arrays.unit[k])
     stops, counted = PairStops(mechanism, unit), links_counting_turns(mechanism)
-    u = {given.pair: np.full((run.good, 1), given.position) for given in mechanism.inputs}
+    u = {given.pair: np.full((good, 1), given.position) for given in mechanism.inputs}
     is_long = stops.high - stops.low > TURN + SURE_DISTANCE
     if any(
         not counted.isdisjoint(pair.bodies) or (pair_is_long and pair.name not in u)
         for pair, pair_is_long in zip(stops.pairs, is_long.tolist(), strict=True)
     ):
         return None
-    positions = arrays.start[k] + run.rotation
-    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[: run.good, None]
-    places = np.moveaxis(run.places(rows)[..., : run.good], 1, 2)[:, None, :, :, None]
+    positions = arrays.start[k] + rotation
+    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[:good, None]
+    places = np.moveaxis(point_places(rows)[..., :good], 1, 2)[:, None, :, :, None]
     points = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
     frames = DesignFrames(mechanism, shapes_of_links(mechanism), u, points, unit)
     if not frames.is_clear[0]:
         return None
     values = np.array([frames.pair_value(pair.name)[0][:, 0] for pair in stops.pairs])
     ending = _find_first_stop(stops, values, np.array([angle[:, 0] for angle in frames.angles.values()]))
-    if ending is None or (ending.outcome is Outcome.SOLVED and run.good < len(positions)):
+    if ending is None or (ending.outcome is Outcome.SOLVED and good < len(positions)):
         return None  # beside a dead point it is not clear which comes first
     if ending.outcome is Outcome.SOLVED:
         return ending
@@ -136,97 +120,3 @@ def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageE
     k = int(np.argmin(distances[:, first]))
     is_upper = bool(values[k, first] > values[k, first - 1])
     return LinkageEnding(first, Outcome.STOP, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units))
-
-
-def _make_tape(
-    arrays: LinkageArrays, block_numbers: Sequence[Array], points: PointArrays, rows: IntArray
-) -> TapedLinkages:
-    """The tape of all linkages: the inputs of a linkage, then its blocks, then its points, each to its row."""
-    linkage_count, inputs = len(arrays), arrays.inputs
-    block_owner = np.repeat(np.arange(linkage_count), np.diff(arrays.first_block))
-    owners = inputs.owner, block_owner, points.owner
-    first = part_offsets(np.bincount(np.concatenate(owners), minlength=linkage_count))
-    # the blocks of a linkage in the order inputs, blocks of links, points
-    order = np.argsort(np.concatenate(owners), kind="stable")
-    position = np.empty_like(order)
-    position[order] = np.arange(len(order))
-    at_input, at_block, at_point = np.split(position, np.cumsum([len(owner) for owner in owners])[:-1])
-    slots = np.full((first[-1], 1 + max(batch.block_type.slot_count for batch in arrays.batches)), FRAME)
-    p = np.zeros((first[-1], max(INPUT_NUMBERS, *(values.shape[1] for values in block_numbers))))
-    kinds, blocks = np.empty(first[-1], dtype=np.int64), np.full(first[-1], -1)
-    kinds[at_input], kinds[at_point] = np.where(inputs.runs, RUNNING_INPUT, STANDING_INPUT), POINT
-    p[at_input, :INPUT_NUMBERS] = np.stack(
-        [inputs.value, *inputs.cos_and_sin(), inputs.velocity, inputs.acceleration], axis=1
-    )
-    slots[at_input, 0], slots[at_input, 1] = TABLE, _slot_numbers(inputs.link_index)
-    p[at_point, :2], p[at_point, 2] = points.numbers, arrays.unit[points.owner]
-    slots[at_point, 0], slots[at_point, 1] = _slot_numbers(points.link_index), rows
-    blocks[at_block] = np.arange(arrays.block_count)
-    for number, (batch, values) in enumerate(zip(arrays.batches, block_numbers, strict=True)):
-        indices, kind = at_block[batch.block_numbers], batch.block_type
-        kinds[indices] = FIRST_BLOCK_TYPE + number
-        slots[indices, : kind.slot_count], slots[indices, kind.slot_count] = (
-            _slot_numbers(batch.link_indices),
-            STEP_TABLE,
-        )
-        p[indices, : values.shape[1]] = values
-    clearance = np.full(linkage_count, LEAST_CLEARANCE)
-    return TapedLinkages(arrays.which, first, kinds, slots, p, blocks, arrays.tolerance, clearance)
-
-
-def _slot_numbers(link_indices: IntArray) -> IntArray:
-    return np.where(link_indices > 0, FIRST_ROOM_SLOT + 1 - link_indices, FRAME)
-
-
-def _block_kinds(types: Sequence[BlockType], rates: bool) -> BlockKinds:
-    def compile_kind(number: int, polished: bool) -> Any:
-        if number == POINT:
-            return compile_block(point_formula(rates))
-        if number < FIRST_BLOCK_TYPE:
-            return compile_block(input_formula(number == RUNNING_INPUT, rates))
-        return types[number - FIRST_BLOCK_TYPE].run_function(rates, polished)
-
-    has_newton_blocks = not all(kind.has_closed_form for kind in types)
-    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table if has_newton_blocks else None)
-
-
-def _pose_rows(rates: bool) -> int:
-    return POSE_ROWS + 6 if rates else POSE_ROWS
-
-
-@lru_cache
-def input_formula(is_running: bool, rates: bool) -> TapeFormula:
-    """The position of an input, cosine and sine of it, and its rates, from its numbers and the rotation of
-    the inputs."""
-
-    def write(table: ca.SX, numbers: ca.SX) -> list[ca.SX]:
-        if is_running:
-            c, s = Vector(numbers[1], numbers[2]).rotate(Vector(table[TABLE_COS], table[TABLE_SIN]))
-            return [numbers[0] + table[TABLE_ANGLE], c, s, numbers[3:]]
-        return [numbers[:3], ca.SX.zeros(2)]
-
-    rows = (X, COS, SIN, X1, X2) if rates else (X, COS, SIN)
-    table = [FormulaInput("row", 0, row) for row in (TABLE_COS, TABLE_SIN, TABLE_ANGLE)]
-    formula = write_formula([table, [FormulaInput("p", k) for k in range(INPUT_NUMBERS)]], write)
-    return TapeFormula(formula, tuple((1, row) for row in rows))
-
-
-@lru_cache
-def point_formula(rates: bool) -> TapeFormula:
-    """x and y of a point, then of its first and second rates, from its link's pose and rates.
-
-    Numbers: the point in its link (m), then the unit of lengths of the linkage (m).
-    """
-
-    def write(link: ca.SX, numbers: ca.SX) -> list[ca.SX]:
-        arm = ca.vertcat(*map(ca.SX, Vector(numbers[0], numbers[1]).rotate(Vector(link[COS], link[SIN]))))
-        rows = [numbers[2] * link[[X, Y]] + arm]
-        if rates:
-            across = ca.vertcat(-arm[1], arm[0])
-            rows.append(numbers[2] * link[[X1, Y1]] + link[TURN1] * across)
-            rows.append(numbers[2] * link[[X2, Y2]] + link[TURN2] * across - link[TURN1] ** 2 * arm)
-        return rows
-
-    link = [FormulaInput("row", 0, row) for row in range(_pose_rows(rates))]
-    formula = write_formula([link, [FormulaInput("p", k) for k in range(3)]], write)
-    return TapeFormula(formula, tuple((1, row) for row in range(POINT_ROWS[rates])))

@@ -8,27 +8,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import CLEAR_REGULARITY
+from planar.batch.mechanisms.block_tapes import LEAST_CLEARANCE, make_block_kinds, make_tape
 from planar.batch.mechanisms.block_type import (
     COS,
     JUDGED_ROWS,
     MAX_SIGNS,
     POSE_ROWS,
-    SIN,
     SKETCH_SUMS,
     BlockType,
-    X,
     newton_numbers,
-    step_table,
 )
-from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, PointArrays
-from planar.codegen.tape import LANES, Tape, run_tape
+from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
+from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, run_steps
+from planar.codegen.tape import LANES
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.nearest_assembly import is_at_sketch, is_surely_farther
 
-LEAST_CLEARANCE = 1e-4
-"""Minimum distance measure from a dead point of an assembly that is taken."""
 SKETCH_DISTANCE_RATIO = 0.075
 """Largest mean distance of points from the sketch (sizes), divided by the regularity of the Jacobian, at which no other
 assembly is nearer."""
@@ -38,9 +35,21 @@ LEAST_SPREAD = 1e-12
 """Squared sizes: points of a link that are nearer to each other define no angle."""
 
 
-def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Array]]:
-    """Whether the assembly of each linkage is surely the one that a search of the mechanism returns (linkages,), and
-    of every batch the numbers of its blocks for the run: p, then signs or unknowns (blocks, numbers).
+NO_INDICES = np.zeros(0, dtype=np.int64)
+NO_POINTS = LinkArrays(NO_INDICES, NO_INDICES, np.zeros((0, 2)))
+
+
+class LinkageAssemblies(NamedTuple):
+    """Assemblies of linkages: whether that of each is surely the one that a search of the mechanism returns
+    (linkages,), and of every batch the numbers of its blocks for the run: p, then signs or unknowns (blocks,
+    numbers)."""
+
+    is_sure: BoolArray
+    block_numbers: list[Array]
+
+
+def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
+    """Find the assemblies of linkages nearest to their sketches.
 
     An assembly mode of a block is accepted if every other mode is farther from the sketch by more than the distance of
     all blocks of the linkage together: every other choice gives a larger total distance. Newton's method solves blocks
@@ -58,7 +67,7 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Ar
     for batch in linkages.batches:
         kind, owner = batch.block_type, batch.owner
         if kind.has_closed_form:
-            rows = starts.judgements[batch.block_numbers, :, 0]
+            rows = starts.judgements(batch)
             block_numbers.append(np.hstack([batch.p, rows[:, : kind.sign_count]]))
             nearest, second, residual, clear = rows[:, kind.sign_count : kind.sign_count + JUDGED_ROWS].T
             with np.errstate(invalid="ignore"):
@@ -80,7 +89,8 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> tuple[BoolArray, list[Ar
         is_sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     if np.any(clearance > LEAST_CLEARANCE):
         is_sure &= starts.run(clearance)
-    return is_sure, block_numbers
+    is_sure &= ~linkages.has_short_arm
+    return LinkageAssemblies(is_sure, block_numbers)
 
 
 class _ShownBlocks(NamedTuple):
@@ -91,78 +101,69 @@ class _ShownBlocks(NamedTuple):
 
 
 class _Starts:
-    """The blocks of linkages as a tape of one step, with the places of all links in a separate state."""
+    """Linkages as a tape of one step, whose results are the poses of all links, then how blocks are judged."""
 
     def __init__(self, linkages: LinkageArrays):
-        self.linkages, blocks = linkages, linkages.block_count
-        self.first = part_offsets(linkages.link_counts)
-        self.state = np.zeros((1 + self.first[-1], POSE_ROWS, LANES))
-        _fill_inputs(self.state, linkages, self.first)
+        self.linkages, self.first = linkages, part_offsets(linkages.link_counts)
+        self.place_count = 1 + int(self.first[-1])
+        self.state = np.zeros((self.place_count + linkages.block_count, MAX_SIGNS + JUDGED_ROWS, LANES))
+        self.state[0, COS] = 1.0
         self.sums = _sketch_sums(linkages.sketch_points([one.sketch for one in linkages.structures]), self.first)
-        self.judgements = np.zeros((blocks, MAX_SIGNS + JUDGED_ROWS, LANES))
-        self.places = {batch.block_type: batch.state_indices(self.first) for batch in linkages.batches}
+        types = [batch.block_type for batch in linkages.batches]
+        self.kinds = make_block_kinds(types, False, is_start=True)
+        self.places = {batch.block_type: self._link_places(batch.owner[:, None], batch.link_indices)
+                       for batch in linkages.batches}  # fmt: skip
         self.shown: dict[BlockType, _ShownBlocks] = {}
-        self.kinds = np.zeros(blocks, dtype=np.int64)
-        slot_count = 1 + max(kind.slot_count for kind in self.places)
-        self.slots, self.table = np.zeros((blocks, slot_count), dtype=np.int64), step_table(1, 0.0)
-        number_counts = (
-            kind.number_count
-            + (SKETCH_SUMS * len(kind.inner_links) if kind.has_closed_form else 2 * len(kind.unknown_is_angle))
-            for kind in self.places
-        )
-        self.p = np.zeros((blocks, max(number_counts)))
-        self.functions = []
-        for kind_number, batch in enumerate(linkages.batches):
-            kind, indices, places = batch.block_type, batch.block_numbers, self.places[batch.block_type]
-            self.kinds[indices] = kind_number
-            self.slots[indices, : kind.slot_count] = self.state.ctypes.data + places * self.state.strides[0]
-            if kind.has_closed_form:
-                self.slots[indices, kind.slot_count] = (
-                    self.judgements.ctypes.data + indices * self.judgements.strides[0]
-                )
-                values = np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(indices), -1)])
-                self.p[indices, : values.shape[1]] = values
-                self.functions.append(kind.start_function)
-            else:
-                self.slots[indices, kind.slot_count] = self.table.ctypes.data
-                self.functions.append(kind.run_function(False))
-        if not all(batch.block_type.has_closed_form for batch in linkages.batches):
-            self.frames = _shown_frames(linkages, self.first)
-            self._take_frames()
+        has_closed_form = all(kind.has_closed_form for kind in types)
+        self.frames = None if has_closed_form else _shown_frames(linkages, self.first)
+        self.tape = self._make_tape()
+
+    def _link_places(self, owner: IntArray, link_index: IntArray) -> IntArray:
+        """The places of links among those of all linkages; 0 is the frame of all."""
+        return np.where(link_index > 0, link_index + self.first[owner], 0)
+
+    def _make_tape(self) -> TapedLinkages:
+        numbers = [self._start_numbers(batch) for batch in self.linkages.batches]
+        last_slots = [
+            self.place_count + batch.block_numbers if batch.block_type.has_closed_form else STEP_TABLE
+            for batch in self.linkages.batches
+        ]
+        tape = make_tape(self.linkages, numbers, self._link_places, last_slots, NO_POINTS, NO_INDICES)
+        return tape._replace(tolerance=START_TOLERANCE_FACTOR * self.linkages.tolerance)
+
+    def _start_numbers(self, batch: BlockBatch) -> Array:
+        """The numbers of blocks (blocks, numbers): p, then the sums of the sketch, or unknowns to start from."""
+        kind, places = batch.block_type, self.places[batch.block_type]
+        if self.frames is None or kind.has_closed_form:
+            return np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(places), -1)])
+        self.shown[kind] = _unknowns_from_frames(kind, self.frames, places, batch.p)
+        return newton_numbers(kind, batch.p, self.shown[kind].unknowns)
 
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
-        tolerance = START_TOLERANCE_FACTOR * self.linkages.tolerance
-        tape = Tape(self.linkages.first_block, self.kinds, self.slots, self.p, tolerance, clearance)
-        return run_tape(self.functions, 1, tape).good > 0
+        return run_steps(self.tape._replace(clearance=clearance), self.kinds, False, self.state, 1).good > 0
+
+    def judgements(self, batch: BlockBatch) -> Array:
+        """How blocks in closed form are judged (blocks, rows), see `BlockType.start_formula`."""
+        return self.state[self.place_count + batch.block_numbers, :, 0]
 
     def take_solved_frames(self) -> bool:
         """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
-        if all(blocks.is_shown.all() for blocks in self.shown.values()):
+        if self.frames is None or all(blocks.is_shown.all() for blocks in self.shown.values()):
             return False
-        x, y, c, s = np.moveaxis(self.state[:, :, 0], 1, 0)
+        x, y, c, s = self.state[: self.place_count, :POSE_ROWS, 0].T
         with np.errstate(invalid="ignore"):
             is_solved = ~self.frames.is_known & (np.abs(c * c + s * s - 1.0) < 0.5)
-        angle = np.where(is_solved, np.arctan2(s, c), 0.0)
-        pairs = zip((x, y, c, s, angle), self.frames.frame[:5], strict=True)
-        frame = Frame(*(np.where(is_solved, new, old) for new, old in pairs))
+        solved = Frame(x, y, c, s, np.where(is_solved, np.arctan2(s, c), 0.0))
+        frame = _choose_frames(is_solved, solved, self.frames.frame)
         self.frames = self.frames._replace(frame=frame, is_known=self.frames.is_known | is_solved)
-        self._take_frames()
+        self.tape = self._make_tape()
         return True
-
-    def _take_frames(self) -> None:
-        for batch in self.linkages.batches:
-            kind, numbers = batch.block_type, batch.block_numbers
-            if not kind.has_closed_form:
-                shown_blocks = _unknowns_from_frames(kind, self.frames, self.places[kind], batch.p)
-                self.shown[kind] = shown_blocks
-                values = newton_numbers(kind, batch.p, shown_blocks.unknowns)
-                self.p[numbers, : values.shape[1]] = values
 
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
         inner = self.places[batch.block_type][:, batch.inner_slots]
-        x, y, c, s = np.moveaxis(self.state[inner, :, 0], 2, 0)
+        x, y, c, s = np.moveaxis(self.state[inner, :POSE_ROWS, 0], 2, 0)
         counts, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
         with np.errstate(invalid="ignore", over="ignore"):
             mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
@@ -199,6 +200,11 @@ def _frame_through(angle: Array, local: Array, world: Array) -> Frame:
     """The frame at an angle in which points of links (2, links) lie where they are in the world."""
     c, s = np.cos(angle), np.sin(angle)
     return Frame(world[0] - (c * local[0] - s * local[1]), world[1] - (s * local[0] + c * local[1]), c, s, angle)
+
+
+def _choose_frames(is_new: BoolArray, new: Frame, old: Frame) -> Frame:
+    """New frames where they are, old ones elsewhere."""
+    return Frame(*(np.where(is_new, *parts) for parts in zip(new[:5], old[:5], strict=True)))
 
 
 class _Slide(NamedTuple):
@@ -267,21 +273,11 @@ def _align_slider(
                 slide.residual({**frames, link: frame_at(0.0, 0.0, angle)})[row] for angle in (0.0, 1.0)
             )
             slider_frame = _frame_through(constant / (constant - rotated), local, world)
-            parts = zip(slider_frame[:5], frames[link][:5], strict=True)
-            frames[link] = Frame(*(np.where(is_aligned, *both) for both in parts))
+            frames[link] = _choose_frames(is_aligned, slider_frame, frames[link])
             known[link] |= is_aligned
 
 
-def _fill_inputs(state: Array, linkages: LinkageArrays, first: IntArray) -> None:
-    """Put the frame and the inputs into the places (places, rows, steps)."""
-    state[0, COS] = 1.0
-    inputs = linkages.inputs
-    places = first[inputs.owner] + inputs.link_index
-    for row, values in zip((X, COS, SIN), (inputs.value, *inputs.cos_and_sin()), strict=True):
-        state[places, row] = values[:, None]
-
-
-def _sketch_sums(points: PointArrays, first: IntArray) -> Array:
+def _sketch_sums(points: LinkArrays, first: IntArray) -> Array:
     """The sums of the points of every place (places, SKETCH_SUMS)."""
     px, py, tx, ty = points.numbers.T
     along, across = px * tx + py * ty, px * ty - py * tx

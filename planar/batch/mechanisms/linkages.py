@@ -45,45 +45,18 @@ class BlockBatch:
     p: Array
     block_numbers: IntArray
 
-    def state_indices(self, first: IntArray) -> IntArray:
-        """The places among those of all linkages, of which linkage k has those after first[k]; 0 is the frame of
-        all."""
-        return np.where(self.link_indices > 0, self.link_indices + first[self.owner][:, None], 0)
-
     @property
     def inner_slots(self) -> slice:
         """Which of the slots are those of inner links."""
         return slice(self.block_type.slot_count - len(self.block_type.inner_links), self.block_type.slot_count)
 
 
-class InputArrays(NamedTuple):
-    """The inputs of all linkages: linkage, place, position (rad or sizes), whether it is an angle, whether it runs,
-    velocity and acceleration."""
-
-    owner: IntArray
-    link_index: IntArray
-    value: Array
-    is_angle: BoolArray
-    runs: BoolArray
-    velocity: Array
-    acceleration: Array
-
-    def cos_and_sin(self) -> tuple[Array, Array]:
-        """The cosines and sines of the positions; 1 and 0 for lengths."""
-        return np.where(self.is_angle, np.cos(self.value), 1.0), np.where(self.is_angle, np.sin(self.value), 0.0)
-
-
-class PointArrays(NamedTuple):
-    """Points on links: the linkage, the place of the link, and numbers (points, any) of each."""
+class LinkArrays(NamedTuple):
+    """Inputs, or points on links: the linkage, the place of the input or link, and numbers (rows, any) of each."""
 
     owner: IntArray
     link_index: IntArray
     numbers: Array
-
-    def followed_by(self, others: PointArrays) -> PointArrays:
-        """These points, then others."""
-        owner, link_index = (np.concatenate([self[part], others[part]]) for part in (0, 1))
-        return PointArrays(owner, link_index, np.concatenate([self.numbers, others.numbers]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +65,11 @@ class LinkageArrays:
 
     `which` (linkages,) are their numbers in a part, `numbers` those of all linkages, of linkage k after
     first_number[k]; `start` (linkages,) the position of the input that runs (rad), `tolerance` that of residuals,
-    `link_counts` how many links and inputs each has beside the frame. `batches`: one of each block type; the blocks of
-    a linkage are solved in the order of their numbers. `watched_points`: two of each link that decides where a pair
-    with stops is, x and y in the link (m): the origin of its axes and the place at the size on the x-axis.
+    `has_short_arm` whether rounding takes digits of the angle of a link, `link_counts` how many links and inputs each
+    has beside the frame. `batches`: one of each block type; the blocks of a linkage are solved in the order of their
+    numbers. `inputs` have the position (rad or sizes), its cosine and sine (1 and 0 for lengths), velocity and
+    acceleration; `is_running` (inputs,). `watched_points`: two of each link that decides where a pair with stops is, x
+    and y in the link (m): the origin of its axes and the place at the size on the x-axis.
     """
 
     mechanisms: Sequence[Mechanism]
@@ -106,10 +81,12 @@ class LinkageArrays:
     link_counts: IntArray
     unit: Array
     tolerance: Array
+    has_short_arm: BoolArray
     batches: Sequence[BlockBatch]
     first_block: IntArray
-    inputs: InputArrays
-    watched_points: PointArrays
+    inputs: LinkArrays
+    is_running: BoolArray
+    watched_points: LinkArrays
 
     def __len__(self) -> int:
         """How many linkages there are."""
@@ -120,21 +97,26 @@ class LinkageArrays:
         """How many blocks all linkages have."""
         return int(self.first_block[-1])
 
-    def points(self, names: Sequence[Sequence[str]]) -> PointArrays:
+    def points(self, names: Sequence[Sequence[str]]) -> LinkArrays:
         """Points of every linkage by their names: x and y in the link (m)."""
-        parts = [[one.members[name][0] for name in own] for one, own in zip(self.structures, names, strict=True)]
-        owner, point = _concatenate([np.array(part, dtype=np.int64) for part in parts])
-        link_index = np.concatenate([one.point_places[part] for one, part in zip(self.structures, parts, strict=True)])
-        first = 2 * point + self.first_number[owner]
-        return PointArrays(owner, link_index, np.array([self.numbers[first], self.numbers[first + 1]]).T)
+        points = [
+            np.array([structure.members[name][0] for name in names_of_linkage], dtype=np.int64)
+            for structure, names_of_linkage in zip(self.structures, names, strict=True)
+        ]
+        pairs = zip(self.structures, points, strict=True)
+        return self._gather([structure.point_places[part] for structure, part in pairs], [2 * part for part in points])
 
-    def sketch_points(self, layouts: Sequence[PointLayout]) -> PointArrays:
+    def sketch_points(self, layouts: Sequence[PointLayout]) -> LinkArrays:
         """Points of every linkage by a layout of its structure: x and y in the link, and in the world (sizes)."""
-        owner, link_index = _concatenate([layout.link_index for layout in layouts])
-        places = (np.concatenate(parts) for parts in zip(*(layout[1:] for layout in layouts), strict=True))
-        first = [part + self.first_number[owner] for part in places]
-        coordinates = np.array([self.numbers[row + part] for row in first for part in (0, 1)])
-        return PointArrays(owner, link_index, (coordinates / self.unit[owner]).T)
+        link_index, *places = zip(*layouts, strict=True)
+        points = self._gather(link_index, *places)
+        return points._replace(numbers=points.numbers / self.unit[points.owner][:, None])
+
+    def _gather(self, link_index: Sequence[IntArray], *places: Sequence[IntArray]) -> LinkArrays:
+        """Pairs of coordinates from places among the numbers of every linkage."""
+        owner, all_links = _concatenate(link_index)
+        first = [np.concatenate(part) + self.first_number[owner] for part in places]
+        return LinkArrays(owner, all_links, np.array([self.numbers[row + k] for row in first for k in (0, 1)]).T)
 
     def links_of_block(self, number: int) -> str:
         """The names of the inner links of a block."""
@@ -142,21 +124,14 @@ class LinkageArrays:
         return ", ".join(self.structures[owner].blocks[number - self.first_block[owner]].inner_links)
 
 
-class _Row(NamedTuple):
-    """A mechanism by its number, its structure, which input runs, and where its numbers begin."""
-
-    number: int
-    mechanism: Mechanism
-    structure: Structure
-    running: int
-    first: int
-
-
 def make_linkage_arrays(mechanisms: Mapping[int, Mechanism], pair: str | None) -> LinkageArrays | None:
     """Those of the mechanisms, by their numbers, that can be solved block after block, with the input that runs at
     `pair`; None if there are none."""
-    rows: list[_Row] = []
+    which: list[int] = []
+    structures: list[Structure] = []
+    running_inputs: list[int] = []
     numbers: list[float] = []
+    first: list[int] = []
     for k, mechanism in mechanisms.items():
         running = running_input_index(mechanism, pair, "inputs")
         try:
@@ -164,17 +139,33 @@ def make_linkage_arrays(mechanisms: Mapping[int, Mechanism], pair: str | None) -
         except (NotPartitionable, BadInput, PointPlacementError):
             continue
         if structure.input_is_angle[running]:
-            rows.append(_Row(k, mechanism, structure, running, len(numbers)))
+            which.append(k)
+            structures.append(structure)
+            running_inputs.append(running)
+            first.append(len(numbers))
             numbers += mechanism_numbers
-    if not rows:
+    if not which:
         return None
-    values = np.array(numbers, dtype=float)
-    unit, reach = _sizes(rows, values)
-    has_short_arm = _has_short_arm(rows, values, unit)
-    if has_short_arm.any():
-        kept = np.flatnonzero(~has_short_arm)
-        rows, unit, reach = [rows[k] for k in kept.tolist()], unit[kept], reach[kept]
-    return _make_arrays(rows, values, unit, reach) if rows else None
+    solvable, values, first_number = [mechanisms[k] for k in which], np.array(numbers, dtype=float), np.array(first)
+    unit, reach = _sizes(structures, first_number, values)
+    first_block = part_offsets([len(structure.blocks) for structure in structures])
+    return LinkageArrays(
+        solvable,
+        structures,
+        np.array(which),
+        values,
+        first_number,
+        np.array([one.inputs[running].position for one, running in zip(solvable, running_inputs, strict=True)]),
+        np.array([structure.place_count - 1 for structure in structures]),
+        unit,
+        residual_tolerance(np.array([len(structure.link_index) for structure in structures]), reach / unit),
+        _has_short_arm(structures, first_number, values, unit),
+        list(_make_batches(structures, first_block, values, first_number, unit)),
+        first_block,
+        _input_arrays(solvable, structures, unit),
+        np.concatenate([np.arange(len(one.inputs)) == k for one, k in zip(solvable, running_inputs, strict=True)]),
+        _watched_points(solvable, structures, unit),
+    )
 
 
 def _concatenate(parts: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
@@ -182,14 +173,14 @@ def _concatenate(parts: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
     return np.repeat(np.arange(len(parts)), [len(part) for part in parts]), np.concatenate(parts)
 
 
-def _sizes(rows: Sequence[_Row], values: Array) -> tuple[Array, Array]:
+def _sizes(structures: Sequence[Structure], first_number: IntArray, values: Array) -> tuple[Array, Array]:
     """The greatest extent of a link of each linkage, and the greatest coordinate (m)."""
-    counts = [len(row.structure.point_places) for row in rows]
+    counts = [len(structure.point_places) for structure in structures]
     owner, point = _concatenate([np.arange(count) for count in counts])
-    first = np.array([row.first for row in rows])[owner] + 2 * point
-    link_owner, starts = _concatenate([row.structure.link_starts for row in rows])
+    first = first_number[owner] + 2 * point
+    link_owner, starts = _concatenate([structure.link_starts for structure in structures])
     starts = starts + part_offsets(counts)[link_owner]
-    unit, reach = np.zeros((2, len(rows)))
+    unit, reach = np.zeros((2, len(structures)))
     if len(owner):
         sides = []
         for coordinates in (values[first], values[first + 1]):
@@ -199,37 +190,16 @@ def _sizes(rows: Sequence[_Row], values: Array) -> tuple[Array, Array]:
     return np.where(unit > 0.0, unit, 1.0), reach
 
 
-def _has_short_arm(rows: Sequence[_Row], values: Array, unit: Array) -> BoolArray:
+def _has_short_arm(structures: Sequence[Structure], first_number: IntArray, values: Array, unit: Array) -> BoolArray:
     """Which linkages have a link whose arm between the pins that place it is so short that rounding takes digits of
     its angle (linkages,)."""
-    owner, ends = _concatenate([row.structure.arms for row in rows])
-    first = 2 * ends + np.array([row.first for row in rows])[owner][:, None]
+    owner, ends = _concatenate([structure.arms for structure in structures])
+    first = 2 * ends + first_number[owner][:, None]
     x, y = (values[first + part] for part in (0, 1))
     length = np.hypot(x[:, 1] - x[:, 0], y[:, 1] - y[:, 0])
-    is_short = np.zeros(len(rows), dtype=bool)
+    is_short = np.zeros(len(structures), dtype=bool)
     is_short[owner[(length > 0.0) & (length < SHORT_ARM * unit[owner])]] = True
     return is_short
-
-
-def _make_arrays(rows: Sequence[_Row], values: Array, unit: Array, reach: Array) -> LinkageArrays:
-    structures, first = [row.structure for row in rows], np.array([row.first for row in rows])
-    first_block = part_offsets([len(structure.blocks) for structure in structures])
-
-    return LinkageArrays(
-        [row.mechanism for row in rows],
-        structures,
-        np.array([row.number for row in rows]),
-        values,
-        first,
-        np.array([row.mechanism.inputs[row.running].position for row in rows]),
-        np.array([one.place_count - 1 for one in structures]),
-        unit,
-        residual_tolerance(np.array([len(one.link_index) for one in structures]), reach / unit),
-        list(_make_batches(structures, first_block, values, first, unit)),
-        first_block,
-        _input_arrays(rows, unit),
-        _watched_points(rows, unit),
-    )
 
 
 def _make_batches(
@@ -252,25 +222,27 @@ def _make_batches(
         yield BlockBatch(block_type, owner, links, numbers, blocks + first_block[owner])
 
 
-def _input_arrays(rows: Sequence[_Row], unit: Array) -> InputArrays:
+def _input_arrays(mechanisms: Sequence[Mechanism], structures: Sequence[Structure], unit: Array) -> LinkArrays:
     inputs = [
-        (owner, 1 + k, given.position, is_angle, k == row.running, given.velocity, given.acceleration)
-        for owner, row in enumerate(rows)
-        for k, (given, is_angle) in enumerate(zip(row.mechanism.inputs, row.structure.input_is_angle, strict=True))
+        (owner, 1 + k, is_angle, given.position, given.velocity, given.acceleration)
+        for owner, (mechanism, structure) in enumerate(zip(mechanisms, structures, strict=True))
+        for k, (given, is_angle) in enumerate(zip(mechanism.inputs, structure.input_is_angle, strict=True))
     ]
-    arrays = InputArrays(*map(np.array, zip(*inputs, strict=True)))
-    return arrays._replace(value=np.where(arrays.is_angle, arrays.value, arrays.value / unit[arrays.owner]))
+    owner, link_index, is_angle, position, velocity, acceleration = map(np.array, zip(*inputs, strict=True))
+    value = np.where(is_angle, position, position / unit[owner])
+    c, s = np.where(is_angle, np.cos(value), 1.0), np.where(is_angle, np.sin(value), 0.0)
+    return LinkArrays(owner, link_index, np.stack([value, c, s, velocity, acceleration], axis=1))
 
 
-def _watched_points(rows: Sequence[_Row], unit: Array) -> PointArrays:
+def _watched_points(mechanisms: Sequence[Mechanism], structures: Sequence[Structure], unit: Array) -> LinkArrays:
     points = [
-        (owner, row.structure.link_index[link], x, 0.0)
-        for owner, row in enumerate(rows)
-        for link in watched_links(row.mechanism)
+        (owner, structure.link_index[link], x, 0.0)
+        for owner, (mechanism, structure) in enumerate(zip(mechanisms, structures, strict=True))
+        for link in watched_links(mechanism)
         for x in (0.0, unit[owner])
     ]
     owner, link_index, *numbers = np.array(points, dtype=float).reshape(-1, 4).T
-    return PointArrays(owner.astype(np.int64), link_index.astype(np.int64), np.stack(numbers, axis=1))
+    return LinkArrays(owner.astype(np.int64), link_index.astype(np.int64), np.stack(numbers, axis=1))
 
 
 def watched_links(mechanism: Mechanism) -> tuple[str, ...]:

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.general_path import solve_design
-from planar.batch.mechanisms.block_runs import run_blocks
+from planar.batch.general_path import SolvedDesign, solve_design
+from planar.batch.mechanisms.block_runs import note_dead_links, prepare_blocks
+from planar.batch.mechanisms.initial_assembly import find_linkage_assemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, SweepRequest, make_linkage_arrays
-from planar.batch.mechanisms.pins import pin_tape, result_pins, run_pins
-from planar.batch.mechanisms.results import Endings, PointTable, Swept, SweptPart
-from planar.batch.mechanisms.tape_runs import DEAD_POINT_NUMBER, FULL_TURN, PartRun, clear_points, make_values
+from planar.batch.mechanisms.pins import frame_pins, make_pin_tape, prepare_pins, result_pins
+from planar.batch.mechanisms.results import PointTable, SweptPart
+from planar.batch.mechanisms.tape_runs import (
+    DEAD_POINT_NUMBER,
+    FULL_TURN,
+    Endings,
+    PreparedTape,
+    clear_points,
+    make_values,
+    run_taped_linkages,
+)
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.turns import take_turn
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
@@ -38,106 +48,141 @@ def solve_part(
     with take_turn():
         if dtype == "float64":
             return _solve(mechanisms, request, values, uses_general_path)
-        return _solve(mechanisms, request, None, uses_general_path).astype(dtype, values)
+        part = _solve(mechanisms, request, None, uses_general_path)
+        values = np.empty(part.values.shape, dtype) if values is None else values
+        with np.errstate(over="ignore", invalid="ignore"):  # numbers behind the last step are arbitrary
+            values[...] = part.values
+        return replace(part, values=values)
 
 
-def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
-    numbers, linkages = _pinned_linkages(mechanisms, request)
-    is_open = np.ones(len(mechanisms), dtype=bool)
-    pins = None
+class _PreparedPart(NamedTuple):
+    """What is known of the mechanisms of a part before they run: the points that are results; where the input of each
+    starts (rad); the tapes of those that are solved pin by pin, and block by block, these as arrays; the rows of pins
+    on the frame, and where they are."""
+
+    points: PointTable
+    start: Array
+    tapes: list[PreparedTape]
+    arrays: LinkageArrays | None
+    fixed_rows: IntArray
+    fixed_places: Array
+
+
+def _prepare_once(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
+    """Prepare a part; linkages that are arrays, or a mechanism alone, are not prepared again for the same points."""
+    if len(mechanisms) > 1 and not isinstance(mechanisms, PinnedLinkages):
+        return _prepare(mechanisms, request)
+    cached = (mechanisms if isinstance(mechanisms, PinnedLinkages) else mechanisms[0]).__dict__
+    known, part = cached.get("_prepared_part", (None, None))
+    if part is None or known != (request.pair, request.points):
+        part = _prepare(mechanisms, request)
+        cached["_prepared_part"] = (request.pair, request.points), part
+    return part  # type: ignore[no-any-return]
+
+
+def _prepare(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
+    pinned, linkages = _pinned_linkages(mechanisms, request.pair)
+    is_open, start = np.ones(len(mechanisms), dtype=bool), np.zeros(len(mechanisms))
+    pins = pin_tape = assemblies = None
     if linkages is not None:
-        pins = result_pins(linkages, request.points)
-        is_open[numbers[pin_tape(linkages).linkages.which]] = False
+        pins, pin_tape, start[pinned] = (
+            result_pins(linkages, request.points),
+            make_pin_tape(linkages),
+            linkages.crank_angles,
+        )
+        is_open[pinned[pin_tape.which]] = False
     arrays = make_linkage_arrays({k: mechanisms[k] for k in np.flatnonzero(is_open).tolist()}, request.pair)
-    if pins is not None and len(numbers) == len(mechanisms):
+    if pins is not None and len(pinned) == len(mechanisms):
         points = pins
     else:
-        points = _point_table(mechanisms, request, numbers, pins, arrays)
-    if values is None:
-        watched_count = 0 if arrays is None else len(arrays.watched_points.owner)
-        values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
-
-    run = PartRun.undecided(len(mechanisms))
-    bars = np.zeros((len(mechanisms), 2), dtype=np.int64)
-    start = np.zeros(len(mechanisms))
-    if linkages is not None and pins is not None:
-        rows = np.arange(len(pins.codes)) + np.repeat(points.first[numbers] - pins.first[:-1], np.diff(pins.first))
-        run_pins(linkages, numbers, pins, rows, values, run, request.steps)
-        tape, start[numbers] = pin_tape(linkages), linkages.crank_angles
-        which = tape.linkages.which
-        bars[numbers[which]] = tape.bars[run.block[numbers[which]]] - linkages.first_bar[which, None]
+        points = _point_table(mechanisms, request.points, pinned, pins, arrays)
+    tapes: list[PreparedTape] = []
+    fixed_rows, fixed_places = np.zeros(0, dtype=np.int64), np.zeros((0, 2))
+    if linkages is not None and pins is not None and pin_tape is not None:
+        rows = np.arange(len(pins.codes)) + np.repeat(points.first[pinned] - pins.first[:-1], np.diff(pins.first))
+        result_numbers = pins.codes + np.repeat(linkages.first_pin[:-1], np.diff(pins.first))
+        is_fixed = np.isin(result_numbers, frame_pins(linkages))
+        fixed_rows, fixed_places = rows[is_fixed], linkages.positions[result_numbers[is_fixed]]
+        if len(pin_tape.which):
+            tapes.append(prepare_pins(linkages, pin_tape, pinned, result_numbers, rows))
     if arrays is not None:
-        run_blocks(arrays, points, values, run, request)
         start[arrays.which] = arrays.start
-
-    undecided = np.flatnonzero(~run.is_decided)
-    run.solved[undecided], run.outcome[undecided] = 0, DEAD_POINT_NUMBER
-    stopped = np.flatnonzero(run.solved <= request.steps)
-    clear_points(values, points.first, stopped, run.solved[stopped])
-    general = {}
-    for k in undecided.tolist() if uses_general_path else ():
-        general[k] = swept = _solve_by_general_path(mechanisms[k], points.names(k), request)
-        orders = [order for order in (swept.position, swept.velocity, swept.acceleration) if order is not None]
-        for row, name in enumerate(points.names(k), points.first[k]):
-            for order, of_points in enumerate(orders):
-                values[row, 2 * order : 2 * order + 2, : request.steps + 1] = of_points[name].T
-    endings = Endings(start, run.solved, run.outcome, bars, run.near, run.reasons)
-    return SweptPart(values[: points.first[-1]], request.steps, points, endings, general)
+        tapes.append(prepare_blocks(arrays, find_linkage_assemblies(arrays), points, request.pair))
+    return _PreparedPart(points, start, tapes, arrays, fixed_rows, fixed_places)
 
 
-def _pinned_linkages(mechanisms: Mechanisms, request: SweepRequest) -> tuple[IntArray, PinnedLinkages | None]:
+def _pinned_linkages(mechanisms: Mechanisms, pair: str | None) -> tuple[IntArray, PinnedLinkages | None]:
     """Those of the mechanisms that are pinned bars, their numbers and as arrays."""
     if isinstance(mechanisms, PinnedLinkages):
         return np.arange(len(mechanisms)), mechanisms
     layouts = {
-        k: each.layout
-        for k, each in enumerate(mechanisms)
-        if request.pair is None and isinstance(each, PinnedMechanism) and each.layout is not None and not each.stops
+        k: mechanism.layout
+        for k, mechanism in enumerate(mechanisms if pair is None else ())
+        if isinstance(mechanism, PinnedMechanism) and mechanism.layout is not None and not mechanism.stops
     }
     if not layouts:
         return np.arange(0), None
-    if len(mechanisms) > 1:
-        return np.array(list(layouts)), PinnedLinkages.from_layouts(list(layouts.values()))
-    cached = mechanisms[0].__dict__  # the tape of one linkage serves its next run
-    if "_linkages" not in cached:
-        cached["_linkages"] = PinnedLinkages.from_layouts(list(layouts.values()))
-    return np.arange(1), cached["_linkages"]
+    return np.array(list(layouts)), PinnedLinkages.from_layouts(list(layouts.values()))
+
+
+def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, uses_general_path: bool) -> SweptPart:
+    part = _prepare_once(mechanisms, request)
+    points, endings = part.points, Endings.undecided(part.start)
+    if values is None:
+        watched_count = 0 if part.arrays is None else len(part.arrays.watched_points.owner)
+        values = make_values(int(points.first[-1]) + watched_count, request.steps, request.rates)
+    values[part.fixed_rows] = 0.0
+    values[part.fixed_rows, :2] = part.fixed_places[:, :, None]
+    for tape in part.tapes:
+        run_taped_linkages(tape, values, request.steps, endings)
+    if part.arrays is not None:
+        note_dead_links(part.arrays, endings)
+
+    undecided = np.flatnonzero(endings.solved < 0)
+    endings.solved[undecided], endings.outcome[undecided] = 0, DEAD_POINT_NUMBER
+    stopped = np.flatnonzero(endings.solved <= request.steps)
+    clear_points(values, points.first, stopped, endings.solved[stopped])
+    for k in undecided.tolist() if uses_general_path else ():
+        names = points.names(k)
+        solved = _solve_by_general_path(mechanisms[k], names, request)
+        endings.solved[k], endings.outcome[k] = np.count_nonzero(solved.status == 0), solved.status[-1]
+        endings.general_inputs[k] = solved.input
+        endings.reasons[k] = str(solved.message or solved.rate_remark)
+        target = values[points.first[k] : points.first[k + 1], :, : request.steps + 1]
+        by_order = solved.out.reshape(request.steps + 1, target.shape[1] // 2, len(names), 2)
+        target[:] = by_order.transpose(2, 1, 3, 0).reshape(target.shape)
+    return SweptPart(values[: points.first[-1]], request.steps, points, endings)
 
 
 def _point_table(
     mechanisms: Mechanisms,
-    request: SweepRequest,
-    numbers: IntArray,
+    names: Sequence[str] | None,
+    pinned: IntArray,
     pins: PointTable | None,
     arrays: LinkageArrays | None,
 ) -> PointTable:
-    """The points of all mechanisms: pins of those of these numbers, of others those named in the request, or all that
-    move."""
-    names: dict[int, Sequence[str]] = {}
-    if pins is not None:
-        names |= {k: pins.names(row) for row, k in enumerate(numbers.tolist())}
-    if arrays is not None:
-        for k, structure in zip(arrays.which.tolist(), arrays.structures, strict=True):
-            if request.points is None:
-                names.setdefault(k, structure.moving_points)
-            else:
-                names.setdefault(k, [name for name in request.points if name in structure.members])
-    for k in range(len(mechanisms)):
-        if k not in names:
-            names[k] = _result_points(mechanisms[k], request.points)
-    return PointTable.of_names([names[k] for k in range(len(mechanisms))])
+    """The points of all mechanisms that are results: pins of those that are pinned bars, points of these names of
+    others; all that move without names."""
+    pin_rows = {} if pins is None else {k: row for row, k in enumerate(pinned.tolist())}
+    structures = {} if arrays is None else dict(zip(arrays.which.tolist(), arrays.structures, strict=True))
+
+    def point_names(k: int) -> Sequence[str]:
+        if pins is not None and k in pin_rows:
+            return pins.names(pin_rows[k])
+        known: Collection[str]
+        if k in structures:
+            known, moving = structures[k].members, structures[k].moving_points
+        else:
+            members = named_points(mechanisms[k])
+            known = [name for name, _ in members]
+            moving = tuple(name for name, points in members if mechanisms[k].frame not in dict(points))
+        return moving if names is None else [name for name in names if name in known]
+
+    return PointTable.of_names(list(map(point_names, range(len(mechanisms)))))
 
 
-def _result_points(mechanism: Mechanism, points: Sequence[str] | None) -> list[str]:
-    """The names of the points that are results of a mechanism: those of `points` that it has, or all that move."""
-    links = {name: {link for link, _ in members} for name, members in named_points(mechanism)}
-    if points is not None:
-        return [name for name in points if name in links]
-    return [name for name in links if mechanism.frame not in links[name]]
-
-
-def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> Swept:
-    """One mechanism as a cycle of its own."""
+def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> SolvedDesign:
+    """One mechanism as a separate cycle."""
     running = running_input_index(mechanism, request.pair, "inputs")
     inputs = tuple(
         given._replace(law=None) if k == running else given._replace(velocity=0.0, acceleration=0.0, law=None)
@@ -148,9 +193,4 @@ def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: 
     if relative_motions(mechanism)[pair].input_kind is not MeasureKind.LENGTH:
         grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
     ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
-    solved = solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)
-    orders = solved.out.reshape(request.steps + 1, 3 if request.rates else 1, len(names), 2)
-    by_name = [{name: orders[:, k, i] for i, name in enumerate(names)} for k in range(orders.shape[1])]
-    position, velocity, acceleration = by_name if request.rates else (by_name[0], None, None)
-    reason = str(solved.message or solved.rate_remark)
-    return Swept(position, velocity, acceleration, solved.input, solved.status, reason, True)
+    return solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)

@@ -184,73 +184,92 @@ def _pair_type_facts(pair_type: type[Pair]) -> _PairTypeFacts | None:
     return _PairTypeFacts(next(_pair_type_numbers), pair_type.prevented_motion_count(), is_pin)
 
 
+class _Joint(NamedTuple):
+    """What a pin or another pair holds together: its pair type and the number of that among all, the links, where the
+    numbers of each are (of other pairs than pins all at the first link), and which input drives it.
+
+    `prevented_motions`: of a link, against one of the others. `is_symmetric`: the same with its links exchanged, as
+    undriven pins, which may have more than two links.
+    """
+
+    pair_type: type[Pair]
+    type_number: int
+    links: list[int]
+    numbers: dict[int, tuple[int, ...]]
+    input: int | None
+    prevented_motions: int
+    is_pin: bool
+    is_symmetric: bool
+
+
 class _Partitioner:
     """Finds the structure of a mechanism."""
 
     def __init__(self, mechanism: Mechanism, point_names: Sequence[tuple[str, ...]], pairs: Sequence[_PairKey]):
         self.mechanism, self.pairs = mechanism, pairs
         self.names = [link.name for link in mechanism.links]
-        self.frame = self.names.index(mechanism.frame)
         points = [(link, name) for link, names in zip(self.names, point_names, strict=True) for name in names]
         self.points = {point: k for k, point in enumerate(points)}
         self.point_links = [link for link, names in enumerate(point_names) for _ in names]
         self.number_count = 2 * len(points)
         self.measured_pairs: list[tuple[int, int, int]] = []
-        self.ends: list[tuple[int, int]] = []
-        "the links of every pair"
-        self.pair_numbers: list[tuple[int, ...]] = []
-        "where the numbers of every pair are"
-        self.facts: list[_PairTypeFacts] = []
-        self.is_symmetric: list[bool] = []
-        self.neighbours: list[list[tuple[int, int]]] = [[] for _ in self.names]
-        "for every link the links beside it, each with the pair between"
-        self._add_pairs()
-        self.input_of_pair: dict[int, int] = {}
-        self.prevented_motions = [facts.prevented_motions for facts in self.facts]
-        pair_indices = {pairs[k][1]: k for k in reversed(range(len(pairs)))}
-        for k, given in enumerate(mechanism.inputs):
-            index = pair_indices.get(given.pair)
-            if index is None or index in self.input_of_pair:
-                raise NotPartitionable(f"the input at {given.pair} is between links that no pair of their own joins")
-            self.input_of_pair[index] = k
-            self.is_symmetric[index] = False  # an input is of the second body against the first
-            self.prevented_motions[index] += 1
-        self.shared_pins = self._find_shared_pins()
+        self.joints = self._find_joints()
+        self.joints_of: list[list[int]] = [[] for _ in self.names]
+        for number, joint in enumerate(self.joints):
+            for link in joint.links:
+                self.joints_of[link].append(number)
         self.link_index = [-1] * len(self.names)
-        self.link_index[self.frame] = 0
+        self.holders = [-1] * len(self.joints)
+        "of every joint the first of its links that has a place, -1 as long as none has"
+        self.prevented = [0] * len(self.names)
+        "how many motions of each link the links that have a place prevent"
+        self.waiting: list[int] = []
         self.blocks: list[PartitionBlock] = []
         self.arms: list[tuple[int, int]] = []
         self.place_count = 1 + len(mechanism.inputs)
+        self._place(self.names.index(mechanism.frame), 0)
 
-    def _add_pairs(self) -> None:
+    def _find_joints(self) -> list[_Joint]:
         number = {name: k for k, name in enumerate(self.names)}
-        numbers: tuple[int, ...]
-        for k, (pair_type, name, links, _, points) in enumerate(self.pairs):
+        inputs = {given.pair: k for k, given in reversed(list(enumerate(self.mechanism.inputs)))}
+        joints: list[_Joint] = []
+        pins: dict[str, _Joint] = {}
+        driven = set[int]()
+        for k, (pair_type, name, (first, second), entry, points) in enumerate(self.pairs):
             facts = _pair_type_facts(pair_type)
             if facts is None:
                 raise NotPartitionable(f"{name} ties more together than two links at one place")
-            ends = number[links[0]], number[links[1]]
+            links, input_number = [number[first], number[second]], inputs.pop(name, None)
+            if input_number is not None:
+                driven.add(input_number)
+            numbers: dict[int, tuple[int, ...]]
             if facts.is_pin:
-                first, second = 2 * self.points[points[0]], 2 * self.points[points[1]]
-                numbers = first, first + 1, second, second + 1
+                first_number, second_number = 2 * self.points[points[0]], 2 * self.points[points[1]]
+                numbers = {links[0]: (first_number, first_number + 1), links[1]: (second_number, second_number + 1)}
             else:
-                self.measured_pairs.append((k, *ends))
-                numbers = tuple(range(self.number_count, self.number_count + len(pair_type.number_kinds)))
-                self.number_count += len(numbers)
-            self.facts.append(facts)
-            self.is_symmetric.append(facts.is_pin)
-            self.pair_numbers.append(numbers)
-            self.ends.append(ends)
-            self._join(k)
-
-    def _join(self, k: int) -> None:
-        first, second = self.ends[k]
-        self.neighbours[first].append((second, k))
-        self.neighbours[second].append((first, k))
+                self.measured_pairs.append((k, links[0], links[1]))
+                first_number, self.number_count = self.number_count, self.number_count + len(pair_type.number_kinds)
+                numbers = {links[0]: tuple(range(first_number, self.number_count)), links[1]: ()}
+            is_driven = input_number is not None
+            motions, is_symmetric = facts.prevented_motions + is_driven, facts.is_pin and not is_driven
+            joint = _Joint(pair_type, facts.number, links, numbers, input_number, motions, facts.is_pin, is_symmetric)
+            if not is_symmetric or pins.setdefault(entry, joint) is joint:
+                joints.append(joint)
+                continue
+            pin = pins[entry]
+            pin.links.extend(link for link in links if link not in pin.links)
+            pin.numbers.update(numbers)
+        for k, given in enumerate(self.mechanism.inputs):
+            if k not in driven:
+                raise NotPartitionable(f"the input at {given.pair} is between links that no pair of their own joins")
+        return joints
 
     def partition(self) -> Structure:
         """See `Structure`."""
-        self._add_links_and_dyads()
+        while self.waiting:
+            link = self.waiting.pop()
+            if self.link_index[link] < 0:
+                self._add_block_with(link)
         if len(self.blocks) == 0 or -1 in self.link_index:
             self._add_remaining_blocks()
         rows: dict[BlockType, list[int]] = {}
@@ -308,101 +327,51 @@ class _Partitioner:
             layouts.append(PointLayout(*np.array(moving, dtype=np.int64).reshape(-1, 3).T))
         return layouts[0], layouts[1]
 
-    def _find_shared_pins(self) -> dict[int, list[list[int]]]:
-        """For every link the pins that it shares with two links or more, each as its pairs, all from one link."""
-        pins: dict[str, list[int]] = {}
-        for k, (_, _, _, entry, _) in enumerate(self.pairs):
-            if self.is_symmetric[k]:
-                pins.setdefault(entry, []).append(k)
-        shared: dict[int, list[list[int]]] = {}
-        for pairs in pins.values():
-            if len(pairs) > 1:
-                for link in {link for k in pairs for link in self.ends[k]}:
-                    shared.setdefault(link, []).append(pairs)
-        return shared
+    def _place(self, link: int, place: int) -> None:
+        """Give a link its place; the links that it holds wait to be looked at."""
+        self.link_index[link] = place
+        for number in self.joints_of[link]:
+            if self.holders[number] < 0:
+                self.holders[number] = link
+                joint = self.joints[number]
+                for other in joint.links:
+                    if self.link_index[other] < 0:
+                        self.prevented[other] += joint.prevented_motions
+                        self.waiting.append(other)
 
-    def _base_links(self, pairs: list[int]) -> set[int]:
-        """The link from which the pairs of a shared pin start."""
-        return set(self.ends[pairs[0]]) & set(self.ends[pairs[1]])
-
-    def _rebase_pin(self, pairs: list[int], link: int) -> None:
-        """Let the pairs of a shared pin start from another of its links."""
-        if all(link in self.ends[k] for k in pairs):
-            return
-        numbers = {}
-        for k in pairs:
-            for end, part in zip(self.ends[k], (slice(2), slice(2, 4)), strict=True):
-                numbers[end] = self.pair_numbers[k][part]
-            for end, other in (self.ends[k], self.ends[k][::-1]):
-                self.neighbours[end].remove((other, k))
-        links = list(numbers)
-        ends = [pair for pair in combinations(links, 2) if link in pair]
-        for k, (first, second) in zip(pairs, ends, strict=True):
-            self.ends[k], self.pair_numbers[k] = (first, second), numbers[first] + numbers[second]
-            self._join(k)
-
-    def _add_links_and_dyads(self) -> None:
-        """Add the links that follow at once from known ones: one alone, or two together."""
-        prevented = [0] * len(self.link_index)
-        waiting = [self.frame]
-        while waiting:
-            self._add_following_links(waiting, prevented)
-            # two that share a pin with a third, which is not known, and are each joined to one known link
-            for pairs in {id(pairs): pairs for pins in self.shared_pins.values() for pairs in pins}.values():
-                links = dict.fromkeys(link for k in pairs for link in self.ends[k])
-                ends = [link for link in links if self.link_index[link] < 0 and prevented[link] == 2]
-                if len(ends) == 2 and all(self.link_index[link] < 0 for link in links):
-                    self._rebase_pin(pairs, ends[0])
-                    self._add_block(tuple(ends))
-                    waiting += ends
-                    break
-
-    def _add_following_links(self, waiting: list[int], prevented: list[int]) -> None:
-        """Add what follows at once from links that wait; `prevented`: how many motions known links prevent."""
-        place, neighbours, weights = self.link_index, self.neighbours, self.prevented_motions
-        while waiting:
-            new = waiting.pop()
-            for pairs in self.shared_pins.get(new, ()):
-                if not any(place[link] >= 0 for link in self._base_links(pairs)):
-                    self._rebase_pin(pairs, new)
-            touched = []
-            for link, k in neighbours[new]:
-                if place[link] < 0:
-                    prevented[link] += weights[k]
-                    touched.append(link)
-            for link in touched:
-                if place[link] < 0:
-                    waiting += self._add_block_with(link, prevented)
-
-    def _add_block_with(self, link: int, prevented: list[int]) -> tuple[int, ...]:
-        """Add the block of a link, alone or with another, if it follows from known links; return its links."""
+    def _add_block_with(self, link: int) -> None:
+        """Add the block of a link, alone or with another, if it follows from links that have a place."""
+        prevented = self.prevented
         if prevented[link] == 3:
             self._add_block((link,))
-            return (link,)
+            return
         if prevented[link] > 3:
             raise NotPartitionable(f"link {self.names[link]} is held more than once")
         between: dict[int, int] = {}
-        for other, k in self.neighbours[link]:
-            if self.link_index[other] < 0:
-                between[other] = between.get(other, 0) + self.prevented_motions[k]
+        for number in self.joints_of[link]:
+            if self.holders[number] < 0:
+                for other in self.joints[number].links:
+                    between[other] = between.get(other, 0) + self.joints[number].prevented_motions
+        between.pop(link, None)
         for other, motions in between.items():
             total = prevented[link] + prevented[other] + motions
             if total == 6 and prevented[other] <= 3:
                 self._add_block((link, other))
-                return (link, other)
+                return
             if total > 6:
                 raise NotPartitionable(f"links {self.names[link]} and {self.names[other]} are held more than once")
-        return ()
 
     def _add_remaining_blocks(self) -> None:
         """Add the other links in the smallest blocks: Dulmage and Mendelsohn on links, each of three columns."""
         links = [link for link, place in enumerate(self.link_index) if place < 0]
         number = {link: k for k, link in enumerate(links)}
         rows: list[frozenset[int]] = []
-        for ends, weight in zip(self.ends, self.prevented_motions, strict=True):
-            unknown = [number[link] for link in ends if link in number]
-            if unknown:
-                rows += [frozenset(3 * k + part for k in unknown for part in range(3))] * weight
+        for joint, holder in zip(self.joints, self.holders, strict=True):
+            unknown = [number[link] for link in joint.links if link in number]
+            groups = [{unknown[0], k} for k in unknown[1:]] if holder < 0 else [{k} for k in unknown]
+            for group in groups:
+                columns = frozenset(3 * k + part for k in group for part in range(3))
+                rows += [columns] * joint.prevented_motions
         if len(rows) != 3 * len(links):
             raise NotPartitionable("pairs and inputs leave links free, or hold them more than once")
         for block in decompose_blocks(rows, 3 * len(links)):
@@ -413,66 +382,68 @@ class _Partitioner:
                 raise NotPartitionable(f"{len(inner)} links are solved together")
             self._add_block(inner)
 
-    def _add_arms(self, inner: tuple[int, ...], pairs: Sequence[int]) -> None:
-        """Note the arms between the pins that place inner links.
-
-        An input turns its link exactly, and the pairs of later blocks need places only.
-        """
-        if len(inner) == 1 and any(k in self.input_of_pair for k in pairs):
-            return
-        points: dict[int, set[int]] = {link: set() for link in inner}
-        for k in pairs:
-            for link, number in zip(self.ends[k], self.pair_numbers[k][::2], strict=False):
-                if self.facts[k].is_pin and link in points:
-                    points[link].add(number // 2)
-        self.arms += [arm for own in points.values() for arm in combinations(own, 2)]
+    def _ties(self, inner: tuple[int, ...]) -> list[tuple[int, int, int, bool, bool, int, int, int]]:
+        """The pairs of links that joints of a block tie together, in an order that does not depend on names: the number
+        of the pair type, the inner link, the other one if that is an inner link (else -1), whether the inner link is
+        the first or either may be, whether it is driven; then the joint, and the links by their numbers."""
+        local = {link: k for k, link in enumerate(inner)}
+        ties = []
+        for here, link in enumerate(inner):
+            for number in self.joints_of[link]:
+                joint, holder = self.joints[number], self.holders[number]
+                pairs = [(here, -1, link, holder)]
+                if holder < 0:
+                    # the first of them is tied to every other
+                    first, *others = [one for one in joint.links if one in local]
+                    pairs = [min((here, local[one], link, one), (local[one], here, one, link)) for one in others]
+                    if link != first:
+                        continue
+                for one_place, other_place, one, other in pairs:
+                    is_first = joint.is_symmetric or joint.links[0] == one
+                    key = joint.type_number, one_place, other_place, is_first, joint.input is not None
+                    ties.append((*key, number, one, other))
+        ties.sort()
+        return ties
 
     def _add_block(self, inner: tuple[int, ...]) -> None:
-        """Add a block, its pairs in an order that does not depend on names."""
-        place, driven = self.link_index, self.input_of_pair
+        """Add a block."""
         if len(inner) > 1:
             inner = tuple(sorted(inner, key=self._sort_key))
-        local = {link: k for k, link in enumerate(inner)}
-        rows = []
-        for here, link in enumerate(inner):
-            for other, k in self.neighbours[link]:
-                there = local.get(other, -1)
-                if place[other] >= 0 or there > here:
-                    is_first = self.is_symmetric[k] or self.ends[k][0] == link
-                    rows.append((self.facts[k].number, here, there, is_first, k in driven, k, other))
-        rows.sort()
         given: list[int] = []
         numbers: list[int] = []
         pairs: list[BlockPair] = []
         inputs: list[int] = []
-        for _, here, inside, is_first, is_driven, k, other in rows:
-            there = inside
+        arm_points: list[set[int]] = [set() for _ in inner]
+        for _, here, inside, is_first, is_driven, number, link, other in self._ties(inner):
+            joint, there = self.joints[number], inside
             if inside < 0:
-                there = FRAME_BODY if is_driven and other == self.frame else -1 - len(given)
+                there = FRAME_BODY if is_driven and self.link_index[other] == 0 else -1 - len(given)
                 if there != FRAME_BODY:
-                    given.append(place[other])
-            if is_driven:
-                inputs.append(1 + driven[k])
-            pairs.append(BlockPair(self.pairs[k][0], (here, there) if is_first else (there, here), is_driven))
-            is_exchanged = self.is_symmetric[k] and self.ends[k][0] != inner[here]
-            own = self.pair_numbers[k]
-            numbers += own[2:] + own[:2] if is_exchanged else own
-        self._add_arms(inner, [row[-2] for row in rows])
+                    given.append(self.link_index[other])
+            if joint.input is not None:
+                inputs.append(1 + joint.input)
+            pairs.append(BlockPair(joint.pair_type, (here, there) if is_first else (there, here), is_driven))
+            first, second = (link, other) if joint.is_symmetric else joint.links
+            numbers += joint.numbers[first] + joint.numbers[second]
+            if joint.is_pin:
+                arm_points[here].add(joint.numbers[link][0] // 2)
+                if inside >= 0:
+                    arm_points[inside].add(joint.numbers[other][0] // 2)
+        # an input turns its link exactly, and the pairs of later blocks need places only
+        if len(inner) > 1 or not inputs:
+            self.arms += [arm for points in arm_points for arm in combinations(points, 2)]
         block_type = find_block_type(BlockSignature(len(inner), len(given), tuple(pairs)))
         if not block_type.is_square:
             raise NotPartitionable("constraints hold each other more than once")
         inner_places = range(self.place_count, self.place_count + len(inner))
-        for link, index in zip(inner, inner_places, strict=True):
-            place[link] = index
         self.place_count += len(inner)
+        for link, place in zip(inner, inner_places, strict=True):
+            self._place(link, place)
         names = tuple(self.names[link] for link in inner)
         self.blocks.append(PartitionBlock(block_type, (*given, *inputs, *inner_places), tuple(numbers), names))
 
     def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool]]]:
         """The pairs between a link of a block and known links, so that equal blocks get the same order."""
-        pairs = [
-            (self.facts[k].number, self.is_symmetric[k] or self.ends[k][0] == link, k in self.input_of_pair)
-            for other, k in self.neighbours[link]
-            if self.link_index[other] >= 0
-        ]
+        joints = [self.joints[number] for number in self.joints_of[link] if self.holders[number] >= 0]
+        pairs = [(one.type_number, one.is_symmetric or one.links[0] == link, one.input is not None) for one in joints]
         return len(pairs), sorted(pairs)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from enum import IntEnum
 from functools import lru_cache, partial
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -21,9 +20,8 @@ from planar.batch.mechanisms.tape_runs import (
     TABLE_COS,
     TABLE_SIN,
     BlockKinds,
-    PartRun,
+    PreparedTape,
     TapedLinkages,
-    run_taped_linkages,
 )
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
@@ -173,17 +171,6 @@ SMALLEST_SIZE, LARGEST_SIZE = 1e-50, 1e50
 """m: squares and products of lengths between these are numbers."""
 
 
-class PinTape(NamedTuple):
-    """The linkages that consist of a crank and dyads as a tape of steps, see `PinStep`.
-
-    Slots are the two pins that a step takes and the one that it places, `bars` (steps, 2) those that it uses. Pins and
-    bars are numbered through all linkages.
-    """
-
-    linkages: TapedLinkages
-    bars: IntArray
-
-
 class _Steps(NamedTuple):
     """Steps, level after level: their kinds, the two given pins, the one that is placed, the two bars."""
 
@@ -195,9 +182,9 @@ class _Steps(NamedTuple):
     two: IntArray
 
 
-def _make_tape(linkages: PinnedLinkages) -> PinTape:
+def make_pin_tape(linkages: PinnedLinkages) -> TapedLinkages:
     """Make the tape of the linkages that consist of a crank and dyads, if their assembly is surely that of their pins'
-    places."""
+    places. Slots are the two pins that a step takes and the one that it places, numbered through all linkages."""
     count, bar_counts = len(linkages), np.diff(linkages.first_bar)
     bar_owner = np.repeat(np.arange(count), bar_counts)
     pin_owner = np.repeat(np.arange(count), np.diff(linkages.first_pin))
@@ -226,8 +213,8 @@ def _make_tape(linkages: PinnedLinkages) -> PinTape:
     tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
     shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
     clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
-    blocks = np.arange(len(order))
-    return PinTape(TapedLinkages(which, first, steps.kinds[order], slots, p[order], blocks, tolerance, clearance), bars)
+    bars -= linkages.first_bar[owner[order], None]
+    return TapedLinkages(which, first, steps.kinds[order], slots, p[order], bars, tolerance, clearance)
 
 
 def _find_steps(
@@ -369,46 +356,23 @@ def _extents(points: Sequence[Array], starts: IntArray) -> tuple[Array, Array]:
     return np.sqrt(wide * wide + tall * tall), np.maximum(np.maximum(-left, right), np.maximum(-low, high))
 
 
-_tapes: WeakKeyDictionary[PinnedLinkages, PinTape] = WeakKeyDictionary()
-"""The tapes of linkages, as long as the linkages are kept."""
+def prepare_pins(
+    linkages: PinnedLinkages, tape: TapedLinkages, numbers: IntArray, pins: IntArray, rows: IntArray
+) -> PreparedTape:
+    """Prepare the tape of linkages, see `make_pin_tape`; `numbers` (linkages,) are those in the part.
 
-
-def pin_tape(linkages: PinnedLinkages) -> PinTape:
-    """The tape of linkages, made once."""
-    tape = _tapes.get(linkages)
-    if tape is None:
-        tape = _tapes[linkages] = _make_tape(linkages)
-    return tape
-
-
-def run_pins(
-    linkages: PinnedLinkages,
-    numbers: IntArray,
-    points: PointTable,
-    rows: IntArray,
-    values: Array,
-    run: PartRun,
-    steps: int,
-) -> None:
-    """Run the linkages that have a tape; `numbers` (linkages,) are those in the part.
-
-    `points` are the pins that are results, and `rows` (points,) their rows in values. Other pins have temporary slots
-    that linkages share.
+    `pins` (points,) are those that are results, numbered through all linkages, and `rows` their rows. Other pins have
+    temporary slots that linkages share.
     """
-    taped, rates = pin_tape(linkages).linkages, values.shape[1] == POINT_ROWS[True]
     slots = FIRST_ROOM_SLOT - np.arange(len(linkages.positions))
     slots += np.repeat(linkages.first_pin[:-1], np.diff(linkages.first_pin))
-    pins = points.codes + np.repeat(linkages.first_pin[:-1], np.diff(points.first))
     slots[pins] = rows
-    block_slots = slots[taped.slots]
-    block_slots[taped.kinds == PinStep.CRANK, 0] = TABLE
-    taped = taped._replace(which=numbers[taped.which], slots=block_slots)
-    kinds = BlockKinds(
-        lambda k, polished: compile_block(pin_formulas(rates, polished)[k], LEAST_COSINE), POINT_ROWS[rates]
+    block_slots = slots[tape.slots]
+    block_slots[tape.kinds == PinStep.CRANK, 0] = TABLE
+    return PreparedTape(tape._replace(which=numbers[tape.which], slots=block_slots), _pin_kinds)
+
+
+def _pin_kinds(rates: bool) -> BlockKinds:
+    return BlockKinds(
+        lambda kind, polished: compile_block(pin_formulas(rates, polished)[kind], LEAST_COSINE), POINT_ROWS[rates]
     )
-    run_taped_linkages(taped, kinds, values, steps, run)
-    is_fixed = np.zeros(len(linkages.positions), dtype=bool)
-    is_fixed[frame_pins(linkages)] = True
-    is_fixed_point = is_fixed[pins]
-    values[rows[is_fixed_point]] = 0.0
-    values[rows[is_fixed_point], :2] = linkages.positions[pins[is_fixed_point]][:, :, None]

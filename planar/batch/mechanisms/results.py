@@ -4,42 +4,19 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple, overload
 
 import numpy as np
 
-from planar.batch.mechanisms.tape_runs import FULL_TURN
+from planar.batch.mechanisms.tape_runs import FULL_TURN, Endings
 from planar.foundation.arrays import IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
-
-class PointMapping(Mapping[str, Array]):
-    """Arrays (steps + 1, 2) by the names of points."""
-
-    __slots__ = ("_names", "_values")
-
-    def __init__(self, names: Sequence[str], values: Array):
-        self._names, self._values = names, values
-
-    def __getitem__(self, name: str) -> Array:
-        """The array of a point."""
-        try:
-            found: Array = self._values[self._names.index(name)]
-        except ValueError:
-            raise KeyError(name) from None
-        return found
-
-    def __iter__(self) -> Iterator[str]:
-        """The names."""
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        """How many points there are."""
-        return len(self._names)
+ORDERS = ("position", "velocity", "acceleration")
 
 
 class Swept(NamedTuple):
@@ -66,15 +43,6 @@ class Swept(NamedTuple):
     def whole(self) -> bool:
         """Whether it was solved at every step."""
         return not self.status.any()
-
-    def astype(self, dtype: str) -> Swept:
-        """The same with points of another type."""
-
-        def rounded(points: Mapping[str, Array]) -> Mapping[str, Array]:
-            return {name: values.astype(dtype) for name, values in points.items()}
-
-        rates = [points and rounded(points) for points in (self.velocity, self.acceleration)]
-        return self._replace(position=rounded(self.position), velocity=rates[0], acceleration=rates[1])
 
 
 class PointRows(NamedTuple):
@@ -132,30 +100,15 @@ def pin_number(name: str) -> int | None:
     return int(number) if number.isdecimal() and pin_name(int(number)) == name else None
 
 
-class Endings(NamedTuple):
-    """How mechanisms ended (mechanisms,): at which position of its input each starts (rad), the number of solved steps,
-    the number of the outcome that ends them; for dead points of bars which bars (mechanisms, 2) and between which
-    rotations of the input (mechanisms, 2), in rad; for others a sentence by the number of the mechanism."""
-
-    start: Array
-    solved: IntArray
-    outcome: IntArray
-    bars: IntArray
-    near: Array
-    reasons: Mapping[int, str]
-
-
 @dataclass(frozen=True, eq=False)
 class SweptPart:
     """Mechanisms of a sweep, one after the other: x and y of all points, then their first and second rates, `values`
-    (points, 2 or 6, numbers) of which the first `steps` + 1 count. `general`: those that the general path solved.
-    """
+    (points, 2 or 6, numbers) of which the first `steps` + 1 count."""
 
     values: Array
     steps: int
     points: PointTable
     endings: Endings
-    general: Mapping[int, Swept]
 
     def __len__(self) -> int:
         """How many mechanisms there are."""
@@ -164,52 +117,68 @@ class SweptPart:
     @property
     def last_status(self) -> IntArray:
         """The status at the last step (mechanisms,): 0 where all are solved."""
-        status = np.where(self.endings.solved > self.steps, 0, self.endings.outcome).astype(np.int8)
-        for k, swept in self.general.items():
-            status[k] = swept.status[-1]
-        return status
+        return np.where(self.endings.solved > self.steps, 0, self.endings.outcome).astype(np.int8)
+
+    @property
+    def general_designs(self) -> int:
+        """The number of mechanisms that the general path solved."""
+        return len(self.endings.general_inputs)
+
+    @property
+    def general_positions(self) -> int:
+        """The number of positions that the general path solved."""
+        return sum(int(self.endings.solved[k]) for k in self.endings.general_inputs)
+
+    @property
+    def ending_counts(self) -> tuple[tuple[int, int, str], ...]:
+        """The number of each outcome, how many mechanisms it ends, and the reason of the first of them; for solved ones
+        how many lack rates, or digits of them."""
+        status = self.last_status
+        counts = np.bincount(status)
+        first_ones = sorted((int(np.argmax(status == code)), code) for code in np.flatnonzero(counts).tolist() if code)
+        remarks = [self.reason(k) for k in self.endings.general_inputs if not status[k] and self.reason(k)]
+        endings = tuple((code, int(counts[code]), self.reason(first)) for first, code in first_ones)
+        return (*endings, *((0, len(remarks), remark) for remark in remarks[:1]))
 
     def present_points(self, names: Iterable[str]) -> set[str]:
         """Those of some names that points of the mechanisms have."""
         return {name for name in names if np.any(self.points.rows_of(name) >= 0)}
 
-    def rows(self) -> PointRows:
-        """All their points."""
-        rows = self.values[:, :, : self.steps + 1]
-        orders = [rows[:, row : row + 2].swapaxes(1, 2) for row in range(0, rows.shape[1], 2)]
-        return PointRows(self.points.first, orders[0], *(orders[1:] or (None, None)))
-
-    def astype(self, dtype: str, values: Array | None = None) -> SweptPart:
-        """The same with numbers of another type, in `values` if they are given."""
-        values = np.empty(self.values.shape, dtype) if values is None else values
-        with np.errstate(over="ignore", invalid="ignore"):  # numbers behind the last step are arbitrary
-            values[...] = self.values
-        return replace(self, values=values, general={k: swept.astype(dtype) for k, swept in self.general.items()})
+    def orders(self, first: int | None = None, end: int | None = None) -> list[Array | None]:
+        """Position, velocity and acceleration of points (points, steps + 1, 2), the latter two None without rates."""
+        return point_orders(self.values[first:end], self.steps)
 
     def swept(self, k: int) -> Swept:
         """One of them."""
-        if k in self.general:
-            return self.general[k]
-        names, first = self.points.names(k), self.points.first
-        rows = self.values[first[k] : first[k + 1], :, : self.steps + 1]
-        orders = [PointMapping(names, rows[:, row : row + 2].swapaxes(1, 2)) for row in range(0, rows.shape[1], 2)]
-        position, velocity, acceleration = orders if len(orders) > 1 else (orders[0], None, None)
-        start, solved, outcome, *_ = (part[k] for part in self.endings[:3])
+        names, endings = self.points.names(k), self.endings
+        orders = self.orders(self.points.first[k], self.points.first[k + 1])
+        position, velocity, acceleration = (
+            None if values is None else dict(zip(names, values, strict=True)) for values in orders
+        )
         status = np.zeros(self.steps + 1, dtype=np.int8)
-        status[solved:] = outcome
-        inputs = start + np.linspace(0.0, 1.0, self.steps + 1) * FULL_TURN
-        return Swept(position, velocity, acceleration, inputs, status, self.reason(k), False)
+        status[endings.solved[k] :] = endings.outcome[k]
+        inputs = endings.general_inputs.get(k)
+        if inputs is None:
+            inputs = endings.start[k] + np.linspace(0.0, 1.0, self.steps + 1) * FULL_TURN
+        is_general = k in endings.general_inputs
+        return Swept(position or {}, velocity, acceleration, inputs, status, self.reason(k), is_general)
 
     def reason(self, k: int) -> str:
-        """Why a mechanism ends before its last step; empty where it does not."""
-        if k in self.general:
-            return self.general[k].reason
-        if self.endings.solved[k] > self.steps:
-            return ""
+        """Why a mechanism ends before its last step, or a remark on its rates; empty where there is neither."""
         if k in self.endings.reasons:
             return self.endings.reasons[k]
-        links = ", ".join(f"bar{bar}" for bar in self.endings.bars[k])
+        if self.endings.solved[k] > self.steps:
+            return ""
+        links = ", ".join(f"bar{bar}" for bar in self.endings.links[k])
         return dead_point_reason(links, self.endings.start[k] + self.endings.near[k])
+
+
+def point_orders(values: Array, steps: int) -> list[Array | None]:
+    """Position, velocity and acceleration (points, steps + 1, 2) of values (points, 2 or 6, numbers); None for rates
+    that are not there."""
+    rows = values[:, :, : steps + 1]
+    orders = [rows[:, row : row + 2].swapaxes(1, 2) for row in range(0, rows.shape[1], 2)]
+    return [*orders, None, None][:3]
 
 
 def dead_point_reason(links: str, inputs: Array) -> str:
@@ -222,24 +191,6 @@ def between(inputs: Array) -> str:
     return f"at an input of {inputs[0]:.6g} to {inputs[1]:.6g} rad"
 
 
-def join_parts(parts: Sequence[SweptPart], values: Array) -> SweptPart:
-    """One part of parts of pinned bars that follow one another, whose points are in one array."""
-    if len(parts) == 1:
-        return parts[0]
-    sizes = part_offsets([len(part) for part in parts]).tolist()
-    points = part_offsets([part.points.first[-1] for part in parts])
-    first = np.concatenate([part.points.first[:-1] + k for part, k in zip(parts, points, strict=False)])
-    table = PointTable(np.append(first, points[-1]), np.concatenate([part.points.codes for part in parts]))
-    start, solved, outcome, bars, near = map(np.concatenate, zip(*(part.endings[:-1] for part in parts), strict=True))
-    reasons: dict[int, str] = {}
-    general: dict[int, Swept] = {}
-    for part, begin in zip(parts, sizes, strict=False):
-        reasons |= {begin + k: reason for k, reason in part.endings.reasons.items()}
-        general |= {begin + k: swept for k, swept in part.general.items()}
-    endings = Endings(start, solved, outcome, bars, near, reasons)
-    return SweptPart(values, parts[0].steps, table, endings, general)
-
-
 @dataclass(frozen=True)
 class Each(Sequence[Swept]):
     """Every mechanism of a sweep, in the order in which they were given; one is read when it is asked for.
@@ -250,6 +201,7 @@ class Each(Sequence[Swept]):
     """
 
     _parts: tuple[SweptPart, ...]
+    _values: Array | None
     general: int
     sent: int
     remarks: tuple[str, ...]
@@ -309,26 +261,26 @@ class Each(Sequence[Swept]):
         """A point's "position", "velocity" or "acceleration" (mechanisms, steps + 1, 2), SI.
 
         Not a number where a mechanism has no such point."""
-        found = []
+        of_parts = []
         for part in self._parts:
-            values, rows = getattr(part.rows(), order), part.points.rows_of(name)
-            own = np.full((len(rows), *values.shape[1:]), np.nan)
-            own[rows >= 0] = values[rows[rows >= 0]]
-            found.append(own)
-        return np.concatenate(found) if found else np.zeros((0, 0, 2))
+            values, rows = (
+                part.orders()[("position", "velocity", "acceleration").index(order)],
+                part.points.rows_of(name),
+            )
+            assert values is not None
+            of_part = np.full((len(rows), *values.shape[1:]), np.nan)
+            of_part[rows >= 0] = values[rows[rows >= 0]]
+            of_parts.append(of_part)
+        return np.concatenate(of_parts) if of_parts else np.zeros((0, 0, 2))
 
     def rows(self) -> PointRows:
         """The points of all mechanisms in one array each. Those of a sweep over `planar.pinned_linkages` are not
         copied."""
-        parts = [part.rows() for part in self._parts]
-        if len(parts) == 1:
-            return parts[0]
-        counts = np.concatenate([np.zeros(0, dtype=np.int64), *(np.diff(part.first) for part in parts)])
-        orders = [
-            np.concatenate([values for part in parts if (values := part[1 + order]) is not None])
-            if parts and parts[0][1 + order] is not None
-            else None
-            for order in range(3)
-        ]
-        position = np.zeros((0, 0, 2)) if orders[0] is None else orders[0]
-        return PointRows(part_offsets(counts), position, orders[1], orders[2])
+        counts = np.concatenate([np.zeros(0, dtype=np.int64), *(np.diff(part.points.first) for part in self._parts)])
+        parts = [part.values for part in self._parts]
+        values = parts[0] if len(parts) == 1 else self._values
+        if values is None:
+            values = np.concatenate(parts) if parts else np.zeros((0, 2, 0))
+        position, *rates = point_orders(values, self._parts[0].steps if parts else -1)
+        assert position is not None
+        return PointRows(part_offsets(counts), position, *rates)

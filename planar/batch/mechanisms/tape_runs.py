@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, padded_steps, run_tape
-from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeResult, padded_steps, run_tape
+from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome
 
 FULL_TURN = 2.0 * np.pi
@@ -29,15 +29,9 @@ TABLE_COS, TABLE_SIN, TABLE_ANGLE = range(3)
 """Rows of the table."""
 
 
-class _Attempt(NamedTuple):
-    """The factor by which steps are divided, and whether closed forms are followed by a Newton step."""
-
-    refinement: int
-    polished: bool
-
-
-_ATTEMPTS = (_Attempt(1, False), _Attempt(1, True), _Attempt(REFINEMENT, True), _Attempt(REFINEMENT**2, True))
-"""In this order; every attempt runs the linkages that the previous ones did not decide."""
+ATTEMPTS = (1, False), (1, True), (REFINEMENT, True), (REFINEMENT**2, True)
+"""By which factor steps are divided, and whether closed forms are followed by a Newton step; each attempt runs the
+linkages that the previous ones did not decide."""
 
 
 class BlockKinds(NamedTuple):
@@ -54,14 +48,15 @@ class BlockKinds(NamedTuple):
 class TapedLinkages(NamedTuple):
     """Linkages, `which` (taped,) by their numbers in a part, as sequences of blocks on a tape: those of linkage k from
     first[k] to first[k + 1]; of every block the number of its kind, its `slots` (blocks, slots), its numbers p (blocks,
-    numbers), and its number in `blocks`; the `tolerance` of residuals and the least `clearance` (taped,)."""
+    numbers), and which `links` (blocks, 2) it places; the `tolerance` of residuals and the least `clearance`
+    (taped,)."""
 
     which: IntArray
     first: IntArray
     kinds: IntArray
     slots: IntArray
     p: Array
-    blocks: IntArray
+    links: IntArray
     tolerance: Array
     clearance: Array
 
@@ -72,9 +67,32 @@ class TapedLinkages(NamedTuple):
         counts = np.diff(self.first)[numbers]
         first = part_offsets(counts)
         indices = np.repeat(self.first[numbers] - first[:-1], counts) + np.arange(first[-1])
-        kinds, slots, p, blocks = (values[indices] for values in (self.kinds, self.slots, self.p, self.blocks))
+        kinds, slots, p, links = (values[indices] for values in (self.kinds, self.slots, self.p, self.links))
         tolerance, clearance = self.tolerance[numbers], self.clearance[numbers]
-        return TapedLinkages(self.which[numbers], first, kinds, slots, p, blocks, tolerance, clearance)
+        return TapedLinkages(self.which[numbers], first, kinds, slots, p, links, tolerance, clearance)
+
+
+class Endings(NamedTuple):
+    """How the linkages of a part end (linkages,): where the input of each starts (rad), the number of solved steps (-1
+    until it is decided), and the number of the outcome that ends them. For dead points also the `links` of the tape
+    that come to it (linkages, 2), and between which rotations of the input (linkages, 2), in rad; for others the
+    reasons by the numbers of linkages. `general_inputs`: where the input is (steps + 1,) of those that the general path
+    solved."""
+
+    start: Array
+    solved: IntArray
+    outcome: IntArray
+    links: IntArray
+    near: Array
+    reasons: dict[int, str]
+    general_inputs: dict[int, Array]
+
+    @classmethod
+    def undecided(cls, start: Array) -> Endings:
+        """The endings of a part before anything is decided."""
+        solved, outcome = np.full(len(start), -1), np.zeros(len(start), dtype=np.int64)
+        links, near = np.zeros((len(start), 2), dtype=np.int64), np.zeros((len(start), 2))
+        return cls(start, solved, outcome, links, near, {}, {})
 
 
 class LinkageEnding(NamedTuple):
@@ -85,59 +103,33 @@ class LinkageEnding(NamedTuple):
     reason: str = ""
 
 
-class FineRun(NamedTuple):
-    """A linkage at the steps of an attempt: the number of good steps; the rotation of the inputs (steps,); and a
-    function that returns x and y of result points (points, 2, steps)."""
-
-    good: int
-    rotation: Array
-    places: Callable[[IntArray], Array]
-
-
-FindEnding = Callable[[FineRun], LinkageEnding | None]
-"""Says how a linkage with stops ends; None if that is not sure."""
-
-
-class PartRun(NamedTuple):
-    """How far the linkages of a part came (linkages,): whether that is decided, the number of solved steps, the number
-    of the outcome that ends them; for dead points between which rotations of the inputs (linkages, 2), in rad, and in
-    which block; and sentences by the numbers of linkages."""
-
-    is_decided: BoolArray
-    solved: IntArray
-    outcome: IntArray
-    near: Array
-    block: IntArray
-    reasons: dict[int, str]
-
-    @classmethod
-    def undecided(cls, linkage_count: int) -> PartRun:
-        """The run of a part before anything is decided."""
-        solved, outcome, block = np.zeros((3, linkage_count), dtype=np.int64)
-        return cls(np.zeros(linkage_count, dtype=bool), solved, outcome, np.zeros((linkage_count, 2)), block, {})
-
+FindEnding = Callable[[Array, Callable[[IntArray], Array], int], LinkageEnding | None]
+"""Returns how a linkage with stops ends, by the rotations of its inputs (steps,), a function that returns x and y of
+result points (points, 2, steps), and the number of good steps; None if that is not sure."""
 
 OUTCOME_NUMBERS = {outcome: number for number, outcome in enumerate(Outcome)}
 DEAD_POINT_NUMBER = OUTCOME_NUMBERS[Outcome.DEAD_POINT]
 
 
-def run_taped_linkages(
-    taped: TapedLinkages,
-    kinds: BlockKinds,
-    values: Array,
-    steps: int,
-    run: PartRun,
-    find_endings: Mapping[int, FindEnding] = {},
-) -> None:
+class PreparedTape(NamedTuple):
+    """Linkages on a tape whose result points are rows of a part, the kinds of its blocks without and with rates, and
+    functions for the linkages with stops by their numbers."""
+
+    taped: TapedLinkages
+    make_kinds: Callable[[bool], BlockKinds]
+    find_endings: Mapping[int, FindEnding] = {}
+
+
+def run_taped_linkages(tape: PreparedTape, values: Array, steps: int, endings: Endings) -> None:
     """Run linkages through a turn of their inputs: values (points, `POINT_ROWS`, numbers), see `make_values`, and
-    the `run` are filled. Other solvers take what no attempt decides. `find_endings` are those of linkages with stops.
-    """
+    the `endings` are filled. Other solvers take what no attempt decides."""
+    taped, kinds = tape.taped, tape.make_kinds(values.shape[1] == POINT_ROWS[True])
     undecided = np.arange(len(taped.which))
-    for attempt in _ATTEMPTS if len(undecided) else ():
-        finer = step_division(steps) * attempt.refinement
+    for refinement, polished in ATTEMPTS if len(undecided) else ():
+        finer = step_division(steps) * refinement
         for indices in _chunks(taped, undecided, padded_steps(steps * finer + 1) * values.shape[1] * 8, finer > 1):
-            _AttemptRun(taped.select(indices), kinds, attempt.polished, values, steps, finer).note(run, find_endings)
-        undecided = undecided[~run.is_decided[taped.which[undecided]]]
+            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, tape.find_endings)
+        undecided = undecided[endings.solved[taped.which[undecided]] < 0]
         if not undecided.size:
             break
 
@@ -177,66 +169,75 @@ def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divide
         first = last
 
 
-class _AttemptRun:
-    """Linkages run once, with steps divided by a factor."""
+def run_steps(taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: Array, count: int) -> TapeResult:
+    """Compute the result points (points, rows, numbers) of linkages at `count` steps of a turn, or at the start."""
+    stride, slots = padded_steps(count), taped.slots
+    room = np.empty((max(-int(slots.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
+    rotation = rotations(count)
+    room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(rotation), np.sin(rotation), rotation
+    if kinds.frame_rows:
+        room[-1 - FRAME] = 0.0
+        for row, value in kinds.frame_rows.items():
+            room[-1 - FRAME, row] = value
+    addresses = np.where(
+        slots >= 0, points.ctypes.data + slots * points.strides[0], room.ctypes.data + (-1 - slots) * room.strides[0]
+    )
+    if kinds.step_table is not None:
+        table = np.ascontiguousarray(kinds.step_table(count, FULL_TURN / max(count - 1, 1)))
+        addresses[slots == STEP_TABLE] = table.ctypes.data
+    present = np.flatnonzero(np.bincount(taped.kinds))
+    numbers = np.zeros(present[-1] + 1, dtype=np.int64)
+    numbers[present] = np.arange(len(present))
+    tape = Tape(taped.first, numbers[taped.kinds], addresses, taped.p, taped.tolerance, taped.clearance)
+    return run_tape([kinds.compile(k, polished) for k in present.tolist()], count, tape)
 
-    def __init__(self, taped: TapedLinkages, kinds: BlockKinds, polished: bool, values: Array, steps: int, finer: int):
-        self.taped, self.finer, self.count = taped, finer, steps * finer + 1
-        stride = padded_steps(self.count)
-        self.rotation = np.arange(stride) * (FULL_TURN / (self.count - 1))
-        self.rows: IntArray | None = None
-        refs, points = taped.slots, values
-        if finer > 1:
-            is_result = refs >= 0
-            self.rows, places = np.unique(refs[is_result], return_inverse=True)
-            points, refs = np.empty((len(self.rows), values.shape[1], stride)), refs.copy()
-            refs[is_result] = places
-        self.points = points
-        room = np.empty((max(-int(refs.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
-        room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(self.rotation), np.sin(self.rotation), self.rotation
-        if kinds.frame_rows:
-            room[-1 - FRAME] = 0.0
-            for row, value in kinds.frame_rows.items():
-                room[-1 - FRAME, row] = value
-        addresses = np.where(
-            refs >= 0, points.ctypes.data + refs * points.strides[0], room.ctypes.data + (-1 - refs) * room.strides[0]
-        )
-        if kinds.step_table is not None:
-            table = np.ascontiguousarray(kinds.step_table(self.count, FULL_TURN / (self.count - 1)))
-            addresses[refs == STEP_TABLE] = table.ctypes.data
-        present = np.flatnonzero(np.bincount(taped.kinds))
-        functions = [kinds.compile(k, polished) for k in present.tolist()]
-        number = np.zeros(present[-1] + 1, dtype=np.int64)
-        number[present] = np.arange(len(present))
-        self.result = run_tape(
-            functions,
-            self.count,
-            Tape(taped.first, number[taped.kinds], addresses, taped.p, taped.tolerance, taped.clearance),
-        )
-        if self.rows is not None:
-            values[self.rows, :, : steps + 1] = points[:, :, : self.count : finer]
 
-    def note(self, run: PartRun, find_endings: Mapping[int, FindEnding]) -> None:
-        """Store the decided linkages in the run of the part."""
-        good_counts, outcome, last_blocks = self.result
-        which, is_sure, is_dead = self.taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
-        run.is_decided[which[is_sure]] = True
-        run.solved[which[is_sure]] = (good_counts[is_sure] - 1) // self.finer + 1
-        good, dead = good_counts[is_dead], which[is_dead]
-        run.outcome[dead], run.block[dead] = DEAD_POINT_NUMBER, self.taped.blocks[last_blocks[is_dead]]
-        run.near[dead] = np.stack([self.rotation[good - 1], self.rotation[good]], axis=1)
-        for k, number in enumerate(which.tolist()) if find_endings else ():
-            if number not in find_endings or not good_counts[k]:
-                continue
-            ending = find_endings[number](FineRun(int(good_counts[k]), self.rotation[: self.count], self._places))
-            run.is_decided[number] = ending is not None
-            if ending is not None:
-                run.solved[number] = (ending.solved_steps - 1) // self.finer + 1
-                run.outcome[number] = OUTCOME_NUMBERS[ending.outcome]
-                if ending.reason:
-                    run.reasons[number] = ending.reason
+def rotations(count: int) -> Array:
+    """The rotation of the inputs at `count` steps of a turn, padded."""
+    return np.arange(padded_steps(count)) * (FULL_TURN / max(count - 1, 1))
 
-    def _places(self, rows: IntArray) -> Array:
-        """Return x and y of result points (rows, 2, steps)."""
-        indices = rows if self.rows is None else np.searchsorted(self.rows, rows)
-        return self.points[indices, :2, : self.count]
+
+def _run_once(
+    taped: TapedLinkages,
+    kinds: BlockKinds,
+    polished: bool,
+    values: Array,
+    steps: int,
+    finer: int,
+    endings: Endings,
+    find_endings: Mapping[int, FindEnding],
+) -> None:
+    """Run linkages with steps divided by a factor, and note the endings of those that this decides."""
+    count, points = steps * finer + 1, values
+    if finer > 1:
+        is_result = taped.slots >= 0
+        rows, places = np.unique(taped.slots[is_result], return_inverse=True)
+        points, slots = np.empty((len(rows), values.shape[1], padded_steps(count))), taped.slots.copy()
+        slots[is_result] = places
+        taped = taped._replace(slots=slots)
+    good, outcome, last_blocks = run_steps(taped, kinds, polished, points, count)
+    if finer > 1:
+        values[rows, :, : steps + 1] = points[:, :, :count:finer]
+
+    rotation = rotations(count)
+    which, is_sure, is_dead = taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
+    endings.solved[which[is_sure]] = (good[is_sure] - 1) // finer + 1
+    first_bad, dead = good[is_dead], which[is_dead]
+    endings.outcome[dead], endings.links[dead] = DEAD_POINT_NUMBER, taped.links[last_blocks[is_dead]]
+    endings.near[dead] = np.stack([rotation[first_bad - 1], rotation[first_bad]], axis=1)
+
+    def point_places(result_rows: IntArray) -> Array:
+        indices = np.searchsorted(rows, result_rows) if finer > 1 else result_rows
+        return points[indices, :2, :count]
+
+    for k, number in enumerate(which.tolist()) if find_endings else ():
+        if number not in find_endings or not good[k]:
+            continue
+        ending = find_endings[number](rotation[:count], point_places, int(good[k]))
+        if ending is None:
+            endings.solved[number] = -1
+            continue
+        endings.solved[number] = (ending.solved_steps - 1) // finer + 1
+        endings.outcome[number] = OUTCOME_NUMBERS[ending.outcome]
+        if ending.reason:
+            endings.reasons[number] = ending.reason

@@ -74,58 +74,82 @@ def _fourier_coefficients(path: Array) -> ComplexArray:
 
 
 class _Measure(NamedTuple):
-    """Of a point: a `function` of what a sweep has of it, `order`, (designs, steps + 1, 2).
+    """A `function` of a quantity that a sweep has of a point (designs, steps + 1, 2), or of a link, pair or input.
 
     `of_whole_path`: only of paths that are solved at every step; `of_closed_path`: and that come back to their start.
     """
 
     function: Callable[[Array], Any]
-    order: str = "position"
+    quantity: str = "position"
     of_whole_path: bool = False
     of_closed_path: bool = False
 
 
-def _magnitude_extremes(values: Array) -> Array:
-    return extremes(np.hypot(values[..., 0], values[..., 1]))
+def _size_extremes(values: Array) -> Array:
+    """The least and the greatest of every design (designs, 2), of vectors by length."""
+    return extremes(values if values.ndim == 2 else np.hypot(values[..., 0], values[..., 1]))
 
 
 def _bounding_box(path: Array) -> Array:
     return np.concatenate([np.fmin.reduce(path, axis=1), np.fmax.reduce(path, axis=1)], axis=1)
 
 
-MEASURES: Mapping[str, _Measure] = {
+POINT_MEASURES: Mapping[str, _Measure] = {
     "x_extremes": _Measure(lambda path: extremes(path[..., 0])),
     "y_extremes": _Measure(lambda path: extremes(path[..., 1])),
     "bounding_box": _Measure(_bounding_box),
-    "speed_extremes": _Measure(_magnitude_extremes, "velocity"),
-    "acceleration_extremes": _Measure(_magnitude_extremes, "acceleration"),
+    "speed_extremes": _Measure(_size_extremes, "velocity"),
+    "acceleration_extremes": _Measure(_size_extremes, "acceleration"),
     "path_length": _Measure(path_length, of_whole_path=True),
     "enclosed_area": _Measure(enclosed_area, of_whole_path=True, of_closed_path=True),
     "fourier_descriptors": _Measure(fourier_descriptors, of_whole_path=True, of_closed_path=True),
 }
-"""What is told of a point by name."""
+RESULT_ARGUMENTS: Mapping[str, str] = {
+    **dict.fromkeys(LINK_QUANTITIES, "links"),
+    **dict.fromkeys(PAIR_QUANTITIES, "pairs"),
+    "transmission_angle": "outputs",
+    "effort": "efforts",
+    "reaction": "reactions",
+    "reaction_couple": "reactions",
+}
+"""Quantities of links, pairs and inputs, those attributes of a `Sweep`: which argument of a sweep asks for each."""
+MEASURES: Mapping[str, _Measure] = {
+    **POINT_MEASURES,
+    **{f"{quantity}_extremes": _Measure(_size_extremes, quantity) for quantity in RESULT_ARGUMENTS},
+}
+RATES = "velocity", "acceleration", *LINK_QUANTITIES[1:], *PAIR_QUANTITIES[1:]
 
 
 @dataclass(frozen=True)
-class PointReduction:
-    """A function of a sweep, or of a block of one: a measure of `MEASURES` of a point, (designs, ...)."""
+class NamedReduction:
+    """A function of a sweep, or of a block of one: a measure of `MEASURES` of a point, link, pair or input."""
 
-    point: str
+    name: str
     measure: str
+
+    @property
+    def is_of_point(self) -> bool:
+        """Whether it is a measure of a point."""
+        return self.measure in POINT_MEASURES
+
+    @property
+    def quantity(self) -> str:
+        """The attribute of a sweep that is measured."""
+        return MEASURES[self.measure].quantity
 
     @property
     def wants_rates(self) -> bool:
         """Whether it is made of rates."""
-        return MEASURES[self.measure].order != "position"
+        return self.quantity in RATES
 
     def __call__(self, sweep: Sweep | Each) -> Array:
-        """The measure of every design; not a number where the path is not as the measure wants it."""
+        """The measure of every design; not a number where the path is not as the measure needs it."""
         measure = MEASURES[self.measure]
         if isinstance(sweep, Each):
-            values = sweep.of_point(measure.order, self.point)
+            values = sweep.of_point(measure.quantity, self.name)
         else:
-            points: Mapping[str, Any] = getattr(sweep, measure.order)
-            values = np.asarray(points[self.point])
+            results: Mapping[str, Any] = getattr(sweep, measure.quantity)
+            values = np.asarray(results[self.name])
         measured = measure.function(values)
         if measure.of_whole_path:
             measured[~sweep.whole] = np.nan
@@ -138,35 +162,3 @@ def _is_closed(path: Array) -> BoolArray:
     """Which paths (designs, steps + 1, 2) come back to where they started (designs,)."""
     extent = np.ptp(path, axis=1).max(axis=1)
     return np.asarray(np.abs(path[:, -1] - path[:, 0]).max(axis=1) <= CLOSED_PATH_TOLERANCE * extent)
-
-
-RESULTS: Mapping[str, str] = {
-    **dict.fromkeys(LINK_QUANTITIES, "links"),
-    **dict.fromkeys(PAIR_QUANTITIES, "pairs"),
-    "transmission_angle": "outputs",
-    "effort": "efforts",
-    "reaction": "reactions",
-    "reaction_couple": "reactions",
-}
-"""Results of links, pairs and inputs whose extremes are told by name, those attributes of a `Sweep`: which argument of
-a sweep asks for each."""
-EXTREMES_ENDING = "_extremes"
-
-
-@dataclass(frozen=True)
-class ResultReduction:
-    """A function of a sweep, or of a block of one: the extremes of a result of `RESULTS`, of vectors by length."""
-
-    name: str
-    quantity: str
-
-    @property
-    def wants_rates(self) -> bool:
-        """Whether it is a rate."""
-        return self.quantity in (*LINK_QUANTITIES[1:], *PAIR_QUANTITIES[1:])
-
-    def __call__(self, sweep: Sweep) -> Array:
-        """The least and the greatest of every design (designs, 2)."""
-        results: Mapping[str, Any] = getattr(sweep, self.quantity)
-        values = np.asarray(results[self.name])
-        return extremes(values) if values.ndim == 2 else _magnitude_extremes(values)

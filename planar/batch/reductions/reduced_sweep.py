@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from operator import length_hint
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from planar.batch.block import SolvedDesigns
-from planar.batch.executor import in_order, run_tasks
-from planar.batch.mechanisms.linkages import SweepRequest
-from planar.batch.mechanisms.part_runs import solve_part
-from planar.batch.mechanisms.parts import PartRuns, end_message, find_endings, part_messages, stream_parts
-from planar.batch.mechanisms.results import Each
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
-from planar.batch.reductions.point_reductions import (
-    EXTREMES_ENDING,
-    HARMONICS,
-    MEASURES,
-    RESULTS,
-    PointReduction,
-    ResultReduction,
-)
+from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, RESULT_ARGUMENTS, NamedReduction
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import INTERRUPTED, BlockStore, MemoryStore, SweepPlan
-from planar.document.first_argument import MechanismSource
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import BadInput, Outcome, suggest_name
 from planar.foundation.short_repr import short_repr
-from planar.foundation.time_limit import interrupted, time_is_over
-from planar.model.mechanism import Mechanism
-from planar.model.pin_linkages import PinnedLinkages
+from planar.foundation.time_limit import interrupted
 
 Swept_ = TypeVar("Swept_", bound=Sized)
 Reduction = Callable[[Swept_], Any]
@@ -94,7 +78,7 @@ class ReducedBlock(NamedTuple):
     status: IntArray
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, Any], ...]
+    ending_counts: tuple[tuple[int, int, Any], ...]
 
 
 class Reductions(NamedTuple):
@@ -103,23 +87,22 @@ class Reductions(NamedTuple):
     functions: dict[str, Reduction[Any]]
 
     @property
-    def measures(self) -> list[PointReduction | ResultReduction]:
+    def measures(self) -> list[NamedReduction]:
         """Those that are asked for by name."""
-        functions = self.functions.values()
-        return [function for function in functions if isinstance(function, PointReduction | ResultReduction)]
+        return [function for function in self.functions.values() if isinstance(function, NamedReduction)]
 
     def with_results(self, asked: Mapping[str, Sequence[str] | str]) -> dict[str, tuple[str, ...]]:
         """The names of links, pairs and so on that are asked for, with those of measures."""
         names = {word: (given,) if isinstance(given, str) else tuple(given) for word, given in asked.items()}
         for measure in self.measures:
-            if isinstance(measure, ResultReduction):
-                names[RESULTS[measure.quantity]] += (measure.name,)
+            if not measure.is_of_point:
+                names[RESULT_ARGUMENTS[measure.quantity]] += (measure.name,)
         return names
 
     def with_points(self, points: Sequence[Any] | None, rates: bool) -> tuple[tuple[Any, ...] | None, bool]:
         """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
         only measures are. Raises BadInput."""
-        measured = dict.fromkeys(measure.point for measure in self.measures if isinstance(measure, PointReduction))
+        measured = dict.fromkeys(measure.name for measure in self.measures if measure.is_of_point)
         wants_rates = any(measure.wants_rates for measure in self.measures)
         if len(self.measures) == len(self.functions):
             return tuple(measured), wants_rates
@@ -137,16 +120,14 @@ def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any]
 
 def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Any:
     if isinstance(given, str):
-        point, _, measure = given.rpartition(".")
-        if measure.removesuffix(EXTREMES_ENDING) in RESULTS and measure not in MEASURES:
-            return ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
+        name_of_result, _, measure = given.rpartition(".")
         if measure not in MEASURES:
-            known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
-            hint = suggest_name(measure, known, "measures", None)
+            hint = suggest_name(measure, list(MEASURES), "measures", None)
             raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{hint}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
-        return PointReduction(result_name(point), measure)
+        reduction = NamedReduction(name_of_result, measure)
+        return NamedReduction(result_name(name_of_result), measure) if reduction.is_of_point else reduction
     if not callable(given):
         wanted = "a measure, as 'C.bounding_box', or a function of a sweep"
         raise BadInput(f"reduce.{name}", f"{wanted} is wanted, not {given!r:.40}")
@@ -222,7 +203,7 @@ class ReductionStore(BlockStore):
                 designs = f"designs {part.start} to {part.stop - 1}"
                 raise BadInput(f"reduce.{name}", f"{designs} have an array {shape} each, others {expected}")
         self.blocks[number] = done
-        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+        self.block_notes[number] = done.general_positions, done.general_designs, done.ending_counts
 
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         if not self.blocks:
@@ -243,59 +224,3 @@ class ReductionStore(BlockStore):
         swept = ReducedSweep(self.plan.all_designs.designs, *joined, self.notes())
         listed = self.plan.assemblies
         return swept if listed is None else replace(swept, design=listed.design, assembly=listed.number)
-
-
-def sweep_reduced(
-    mechanisms: Iterable[MechanismSource | PinnedLinkages],
-    request: SweepRequest,
-    runs: PartRuns,
-    reduce: Mapping[str, str | Reduction[Each]],
-) -> ReducedSweep:
-    """Reductions alone of all mechanisms, of which only those are held that are being solved."""
-    wanted = read_reductions(reduce, str, request.steps)
-    for each in wanted.measures:
-        if isinstance(each, ResultReduction):
-            raise BadInput("reduce", f"mechanisms tell points alone, not {each.name}.{each.quantity}")
-    points, rates = wanted.with_points(request.points, request.rates)
-    request = request._replace(points=points, rates=rates)
-    reduce_part = partial(_solve_and_reduce, request=request, reductions=wanted.functions, dtype=runs.dtype)
-    blocks: list[ReducedBlock] = []
-    done, missing = 0, set(points or ())
-    taken = 0
-
-    def tasks() -> Iterator[tuple[int, list[Mechanism] | PinnedLinkages]]:
-        nonlocal taken
-        for part in stream_parts(mechanisms, request.pair):
-            taken += 1
-            yield taken - 1, part
-
-    for block, there in in_order(
-        run_tasks(runs.threads, runs.executor, reduce_part, tasks(), lambda _, part: reduce_part(part))
-    ):
-        blocks.append(block)
-        missing -= there
-        done += len(block.status)
-        runs.report(done, max(done, length_hint(mechanisms, 0)))
-    reason = time_is_over() if taken > len(blocks) else ""
-    if reason and not blocks:
-        raise interrupted(reason, "before a mechanism was reduced")
-    for name in points or ():
-        if name in missing and done and not reason:
-            raise BadInput("points", f"no mechanism has a point {name!r:.60}")
-    sent = sum(block.general_designs for block in blocks)
-    messages = part_messages([block.endings for block in blocks], done, sent)
-    return ReducedSweep({}, *join_blocks(blocks), (*end_message(done, reason), *messages))
-
-
-def _solve_and_reduce(
-    part: list[Mechanism] | PinnedLinkages,
-    request: SweepRequest,
-    reductions: Mapping[str, Reduction[Each]],
-    dtype: str,
-) -> tuple[ReducedBlock, set[str]]:
-    """Reductions of some mechanisms, and which of the points that are wanted are there."""
-    solved = solve_part(part, request)
-    positions = sum(int(np.sum(swept.status == 0)) for swept in solved.general.values())
-    reduced = reduce_all(Each((solved,), positions, len(solved.general), ()), reductions, dtype)
-    block = ReducedBlock(reduced, solved.last_status, positions, len(solved.general), find_endings(solved))
-    return block, solved.present_points(request.points or ())

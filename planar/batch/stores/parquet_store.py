@@ -17,12 +17,7 @@ from pyarrow import parquet
 from planar.batch.block import SolvedDesigns
 from planar.batch.named_results.result_rows import ResultRow
 from planar.batch.results import Sweep
-from planar.batch.stores.store import (
-    FolderStore,
-    SweepPlan,
-    reporting_write_errors,
-    result_views,
-)
+from planar.batch.stores.store import BlockNote, FolderStore, result_views
 from planar.document.files import read_limited
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
@@ -40,33 +35,30 @@ class ParquetStore(FolderStore):
 
     READ_ERRORS = READ_ERRORS
 
-    def __init__(self, plan: SweepPlan, path: Path):
-        super().__init__(plan, path)
-        for file in path.iterdir():
-            if PARTIAL_FILE_NAME.fullmatch(file.name):  # of a process that was killed
-                with suppress(OSError):
-                    file.unlink()
-        self.verified_files: dict[int, tuple[int, int]] = {}
-        "of every block that has its checksum: when its file was written, and how long it is"
-        for number in range(self.plan.block_count):
-            with suppress(*READ_ERRORS):
-                self._verify_block(number)
-                about = json.loads(parquet.read_schema(self._block_path(number)).metadata[b"planar"])
-                self.block_notes[number] = about["general"], about["sent"], about["said"]
-                self.finished.add(number)
-            if number not in self.finished and (
-                self._block_path(number).exists() or self._checksum_path(number).exists()
-            ):
-                self.damaged.add(number)
-
     def read_about(self) -> Any:
         return json.loads(read_limited(self.path / MANIFEST))
 
     def write_about(self, about: dict[str, Any]) -> None:
         write_atomically(self.path / MANIFEST, json.dumps(about).encode())
 
+    def open_blocks(self) -> None:
+        for file in self.path.iterdir():
+            if PARTIAL_FILE_NAME.fullmatch(file.name):  # of a process that was killed
+                with suppress(OSError):
+                    file.unlink()
+        self.verified_files: dict[int, tuple[int, int]] = {}
+        "of every block that has its checksum: when its file was written, and how long it is"
+
+    def inspect_block(self, number: int) -> tuple[BlockNote | None, bool]:
+        try:
+            self._verify_block(number)
+            about = json.loads(parquet.read_schema(self._block_path(number)).metadata[b"planar"])
+            return (about["general"], about["sent"], about["said"]), True
+        except READ_ERRORS:
+            return None, self._block_path(number).exists() or self._checksum_path(number).exists()
+
     def _verify_block(self, number: int) -> None:
-        """Raises BadInput, or one of UNREADABLE, where a block is not whole; looked at once as long as it stays."""
+        """Raises one of `READ_ERRORS` where a block is not whole; looked at once as long as it stays."""
         known = self._block_path(number).stat()
         if self.verified_files.get(number) != (known.st_mtime_ns, known.st_size):
             if read_limited(self._checksum_path(number)) != self._checksum_line(
@@ -85,7 +77,7 @@ class ParquetStore(FolderStore):
         """A checksum as `sha256sum -c` takes it."""
         return f"{checksum}  {self._block_path(number).name}\n".encode()
 
-    def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
+    def write_files(self, number: int, part: slice, done: SolvedDesigns, note: BlockNote) -> None:
         designs, steps = done.status.shape
         columns: dict[str, Array] = {
             "design": np.repeat(np.arange(part.start, part.stop), steps),
@@ -100,25 +92,22 @@ class ParquetStore(FolderStore):
             axes = np.moveaxis(values, 2, 0) if values.ndim == 3 else values[None]
             for column, axis_values in zip(_column_names(row), axes, strict=True):
                 columns[column] = np.ascontiguousarray(axis_values).ravel()
-        endings = [(code, count, str(sentence)) for code, count, sentence in done.endings]
+        general_positions, general_designs, endings = note
         about = {
             "fingerprint": self.fingerprint,
             "block": self.plan.block_size,
             "number": number,
-            "general": done.general_positions,
-            "sent": done.general_designs,
+            "general": general_positions,
+            "sent": general_designs,
             "said": endings,
             "outcomes": [outcome.value for outcome in Outcome],
         }
         content, table = BytesIO(), pa.table(columns).replace_schema_metadata({"planar": json.dumps(about)})
         parquet.write_table(table, content, write_page_checksum=True)
-        with reporting_write_errors(self.path):
-            self._checksum_path(number).unlink(missing_ok=True)
-            write_atomically(self._block_path(number), content.getvalue())
-            write_atomically(
-                self._checksum_path(number), self._checksum_line(number, sha256(content.getbuffer()).hexdigest())
-            )
-        self.block_notes[number] = done.general_positions, done.general_designs, endings
+        checksum = sha256(content.getbuffer()).hexdigest()
+        self._checksum_path(number).unlink(missing_ok=True)
+        write_atomically(self._block_path(number), content.getvalue())
+        write_atomically(self._checksum_path(number), self._checksum_line(number, checksum))
 
     def read_columns(self, columns: tuple[str, ...]) -> list[Array]:
         """Columns of all blocks, each (designs, steps + 1). Raises BadInput."""

@@ -16,7 +16,7 @@ import numpy as np
 from planar.batch.assembly.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.named_results.result_rows import POINT_QUANTITIES, RequestedResults, ResultRow
-from planar.batch.results import Sweep, SweepNotes
+from planar.batch.results import Sweep, SweepNotes, add_ending_counts
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.document.files import to_dict
 from planar.foundation.arrays import Array, part_offsets
@@ -32,6 +32,9 @@ STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
 POINT_UNITS = ("m", "m/s", "m/s^2")
 RowValue = TypeVar("RowValue")
+BlockNote = tuple[int, int, Any]
+"""Of a block the positions and designs of the general path, and by the code of each outcome how many designs ended so,
+and the sentence of the first."""
 INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
 """What stands for that in a status."""
 
@@ -113,8 +116,7 @@ class BlockStore(ABC):
         self.finished: set[int] = set()
         self.damaged: set[int] = set()
         "blocks of which something was there already, but not whole"
-        self.block_notes: dict[int, tuple[int, int, Any]] = {}
-        "of every block: positions and designs of the general path, and what is said"
+        self.block_notes: dict[int, BlockNote] = {}
 
     def output_array(self, part: slice) -> Array | None:
         """Where a block may put its results, if that is known ahead: out (steps + 1, rows, designs)."""
@@ -139,12 +141,9 @@ class BlockStore(ABC):
     def notes(self) -> SweepNotes:
         """What there is to say, in the order of the designs, whichever block was solved first."""
         notes = [note for _, note in sorted(self.block_notes.items())]
-        ended: dict[int, tuple[int, Any]] = {}
-        for _, _, block_endings in notes:
-            for code, count, sentence in block_endings:
-                previous, first = ended.get(code, (0, sentence))
-                ended[code] = previous + count, first
-        endings = tuple((code, *ending) for code, ending in sorted(ended.items()))
+        endings = tuple(
+            (code, *ending) for code, ending in sorted(add_ending_counts(note[2] for note in notes).items())
+        )
         general_designs, plan = sum(note[1] for note in notes), self.plan
         counts = plan.design_count, general_designs, self.general_positions
         return SweepNotes(*counts, endings, plan.block_count, len(self.damaged))
@@ -230,6 +229,15 @@ class FolderStore(BlockStore):
         else:
             with reporting_write_errors(path):
                 self.write_about({"fingerprint": self.fingerprint, "block": plan.block_size})
+        with reporting_write_errors(path):
+            self.open_blocks()
+        for number in range(self.plan.block_count):
+            note, is_begun = self.inspect_block(number)
+            if note is not None:
+                self.finished.add(number)
+                self.block_notes[number] = note
+            elif is_begun:
+                self.damaged.add(number)
 
     @abstractmethod
     def read_about(self) -> Any:
@@ -238,6 +246,25 @@ class FolderStore(BlockStore):
     @abstractmethod
     def write_about(self, about: dict[str, Any]) -> None:
         """Begin the store with what it says about itself, so that it is this sweep's from its first moment."""
+
+    @abstractmethod
+    def open_blocks(self) -> None:
+        """Make what blocks are written to, or remove what a killed process has left."""
+
+    @abstractmethod
+    def inspect_block(self, number: int) -> tuple[BlockNote | None, bool]:
+        """The note of a block that is whole, else None; and whether anything of the block is there."""
+
+    @abstractmethod
+    def write_files(self, number: int, part: slice, done: SolvedDesigns, note: BlockNote) -> None:
+        """Write a solved block and its note."""
+
+    def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
+        endings = [(code, count, str(sentence)) for code, count, sentence in done.endings]
+        note = done.general_positions, done.general_designs, endings
+        with reporting_write_errors(self.path):
+            self.write_files(number, part, done, note)
+        self.block_notes[number] = note
 
     def block_slice(self, number: int) -> slice:
         """The designs of a block."""
@@ -274,7 +301,8 @@ class MemoryStore(BlockStore):
             raise BadInput("store", message)
         self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
-        self.inputs: Array | None = None
+        self.inputs: list[tuple[slice, Array]] = []
+        "of every block where the running input is: in one row for all of its designs, or in a row of each"
         self.dead_point, self.stop_position = np.full((2, plan.design_count), np.nan)
 
     def output_array(self, part: slice) -> Array:
@@ -286,20 +314,24 @@ class MemoryStore(BlockStore):
             out[:] = done.out
         self.status[part], self.dead_point[part] = done.status, done.dead_point
         self.stop_position[part] = done.stop_position
-        self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
+        self.inputs.append((part, done.input))
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def leave_out(self, parts: Mapping[int, slice], reason: str) -> None:
         for number, part in parts.items():
             count = part.stop - part.start
             self.out[:, :, part], self.status[part] = np.nan, INTERRUPTED
-            self.inputs = _join_inputs(self.inputs, np.full((count, self.status.shape[1]), np.nan), part, self.plan)
+            self.inputs.append((part, np.full(self.status.shape[1], np.nan)))
             self.block_notes[number] = 0, 0, ((INTERRUPTED, count, reason),)
 
     def result(self) -> Sweep:
-        assert self.inputs is not None
+        inputs = self.inputs[0][1]
+        if not all(values.ndim == 1 and np.array_equal(values, inputs) for _, values in self.inputs):
+            inputs = np.empty(self.status.shape)
+            for part, values in self.inputs:
+                inputs[part] = values
         ends = self.dead_point, self.stop_position
-        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, self.inputs, ends)
+        return self.make_sweep(self.plan.by_quantity(result_views(self.out, self.plan)), self.status, inputs, ends)
 
 
 def result_views(out: Array, plan: SweepPlan) -> list[Array]:
@@ -311,15 +343,3 @@ def result_views(out: Array, plan: SweepPlan) -> list[Array]:
         by_design[:, :, first] if row.width == 1 else by_design[:, :, first : first + row.width]
         for row, first in zip(rows, offsets, strict=False)
     ]
-
-
-def _join_inputs(inputs: Array | None, part_inputs: Array, part: slice, plan: SweepPlan) -> Array:
-    """The positions of the running input with those of a block; one row as long as all blocks agree."""
-    is_common = inputs is None or (inputs.ndim == 1 and np.array_equal(inputs, part_inputs))
-    if part_inputs.ndim == 1 and is_common:
-        return part_inputs
-    if inputs is None or inputs.ndim == 1:
-        row = np.full(plan.all_designs.steps + 1, np.nan) if inputs is None else inputs
-        inputs = np.tile(row, (plan.design_count, 1))
-    inputs[part] = part_inputs
-    return inputs

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -15,12 +14,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from planar.batch.block import SolvedDesigns
 from planar.batch.named_results.result_rows import ResultRow
 from planar.batch.results import Sweep
-from planar.batch.stores.store import (
-    FolderStore,
-    SweepPlan,
-    reporting_write_errors,
-    result_views,
-)
+from planar.batch.stores.store import BlockNote, FolderStore, result_views
 from planar.document.files import to_dict
 from planar.foundation.arrays import Array
 from planar.foundation.errors import Outcome
@@ -38,16 +32,6 @@ class ZarrStore(FolderStore):
 
     READ_ERRORS = READ_ERRORS
 
-    def __init__(self, plan: SweepPlan, path: Path):
-        super().__init__(plan, path)
-        with (
-            reporting_write_errors(path),
-            zarr.config.set({"array.write_empty_chunks": True}),
-        ):  # a chunk that is not there is lost
-            self.arrays = dict(self._open_arrays())
-        for number in range(self.plan.block_count):
-            self._verify_block(number)
-
     def read_about(self) -> Any:
         self.group = zarr.open_group(str(self.path), mode="r+")
         return dict(self.group.attrs)
@@ -57,20 +41,23 @@ class ZarrStore(FolderStore):
         about |= {"points": list(self.plan.point_names), "outcomes": [outcome.value for outcome in Outcome]}
         self.group = zarr.create_group(str(self.path), attributes=about)
 
+    def open_blocks(self) -> None:
+        with zarr.config.set({"array.write_empty_chunks": True}):  # a chunk that is not there is lost
+            self.arrays = dict(self._open_arrays())
+
     def _open_arrays(self) -> Iterator[tuple[str, Any]]:
         """All arrays by name, those made that are not there or not as they have to be."""
-        plan, rows, steps = self.plan, self.plan.block_size, self.plan.all_designs.steps + 1
-        row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        vector: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
-        vector["dimension_names"] = ("design", "step", "axis")
-        for result in plan.rows:
-            shape = vector if result.width == 2 else row
-            yield self._open_array(_array_path(result), dtype=plan.all_designs.dtype, fill_value=np.nan, **shape)
-        yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
-        yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
-        of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
-        for name in ("dead_point", "stop_position"):
-            yield self._open_array(name, dtype="float64", fill_value=np.nan, **of_designs)
+        plan, row = self.plan, (self.plan.all_designs.steps + 1,)
+        layout: dict[str, tuple[str, float, tuple[int, ...]]] = {
+            _array_path(result): (plan.all_designs.dtype, np.nan, (*row, 2) if result.width == 2 else row)
+            for result in plan.rows
+        }
+        layout |= {"status": ("int8", MISSING_STATUS, row), "input": ("float64", np.nan, row)}
+        layout |= dict.fromkeys(("dead_point", "stop_position"), ("float64", np.nan, ()))
+        for name, (dtype, fill_value, shape) in layout.items():
+            of_array = {"shape": (plan.design_count, *shape), "chunks": (plan.block_size, *shape)}
+            dimensions = ("design", "step", "axis")[: 1 + len(shape)]
+            yield self._open_array(name, dtype=dtype, fill_value=fill_value, dimension_names=dimensions, **of_array)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
         for name, values in plan.design_columns.items():
@@ -101,19 +88,14 @@ class ZarrStore(FolderStore):
             pass
         return name, self.group.create_array(name, overwrite=True, **wanted)
 
-    def _verify_block(self, number: int) -> None:
-        """Take a block as finished that is whole, and as damaged of which only something is there."""
+    def inspect_block(self, number: int) -> tuple[BlockNote | None, bool]:
         record = self._read_record(number)
         # all arrays but those that are written at once, and the records
         names = (name for name in self.arrays if name != "blocks" and not name.startswith("designs/"))
         are_readable = [self.is_readable(name, number) for name in names]
-        if record is not None and all(are_readable):
-            self.finished.add(number)
-            self.block_notes[number] = record
-        elif record is not None or any(are_readable):
-            self.damaged.add(number)
+        return record if all(are_readable) else None, record is not None or any(are_readable)
 
-    def _read_record(self, number: int) -> tuple[int, int, Any] | None:
+    def _read_record(self, number: int) -> BlockNote | None:
         try:
             text = bytes(self.arrays["blocks"][number]).rstrip(b"\0")
             if not text:
@@ -135,17 +117,17 @@ class ZarrStore(FolderStore):
             return False
         return self.has_chunk(name, number)
 
-    def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
-        with reporting_write_errors(self.path):
-            for row, values in zip(self.plan.rows, result_views(done.out, self.plan), strict=True):
-                self.arrays[_array_path(row)][part] = np.ascontiguousarray(values)
-            for name in ("status", "dead_point", "stop_position"):
-                self.arrays[name][part] = getattr(done, name)
-            self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
-            note = done.general_positions, done.general_designs, _shorten_sentences(done.endings)
-            record = json.dumps(note, ensure_ascii=False).encode()
-            self.arrays["blocks"][number] = np.frombuffer(record.ljust(RECORD_BYTES, b"\0"), dtype=np.uint8)
-        self.block_notes[number] = note
+    def write_files(self, number: int, part: slice, done: SolvedDesigns, note: BlockNote) -> None:
+        for row, values in zip(self.plan.rows, result_views(done.out, self.plan), strict=True):
+            self.arrays[_array_path(row)][part] = np.ascontiguousarray(values)
+        for name in ("status", "dead_point", "stop_position"):
+            self.arrays[name][part] = getattr(done, name)
+        self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
+        positions, designs, endings = note
+        longest = (RECORD_BYTES - 512) // (4 * max(1, len(endings)))  # a character has four bytes at most
+        shortened = [(code, count, sentence[:longest]) for code, count, sentence in endings]
+        record = json.dumps((positions, designs, shortened), ensure_ascii=False).encode()
+        self.arrays["blocks"][number] = np.frombuffer(record.ljust(RECORD_BYTES, b"\0"), dtype=np.uint8)
 
     def result(self) -> Sweep:
         results = self.plan.by_quantity(StoredArray(self, _array_path(row)) for row in self.plan.rows)
@@ -201,12 +183,6 @@ class StoredArray:
 
     def __repr__(self) -> str:
         return repr(self._array)
-
-
-def _shorten_sentences(endings: Any) -> list[Any]:
-    """How designs of a block ended, sentences shortened so that all fit into its record."""
-    longest = (RECORD_BYTES - 512) // (4 * max(1, len(endings)))  # a character has four bytes at most
-    return [[code, count, str(sentence)[:longest]] for code, count, sentence in endings]
 
 
 def _array_path(row: ResultRow) -> str:
