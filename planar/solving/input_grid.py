@@ -23,7 +23,6 @@ from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.continuation.run_samples import InputRates, resting_inputs, unjudged_rows
 from planar.solving.position import PositionSolver, solved_mechanism
-from planar.solving.rates.regularity import regularity
 from planar.solving.runs.samples import build_motion
 
 MAX_STARTS = 16
@@ -110,7 +109,7 @@ class InputGrid:
         u = np.array([self.inputs_at(node) for node in nodes])
         run = follow_samples(self.solver, self.z[nodes[0]], resting_inputs(u))
         jacobians, _ = self.solver.functions.jacobians(run.z, run.inputs.u, self.solver.inputs.p)
-        weak = np.flatnonzero(regularity(self.solver, jacobians).min(axis=-1, initial=1.0) < MIN_REGULARITY)
+        weak = np.flatnonzero(self.solver.jacobian_regularity(jacobians).min(axis=-1, initial=1.0) < MIN_REGULARITY)
         if weak.size and weak[0]:
             row = int(weak[0])
             reason = f"a dead point is at {self.solver.describe_inputs(u[row])}"

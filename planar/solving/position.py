@@ -38,14 +38,13 @@ if TYPE_CHECKING:
     from planar.solving.continuation import run_samples
     from planar.solving.continuation.run_samples import BranchRates
     from planar.solving.continuation.solution_curve import CurvePoint
-    from planar.solving.diagnosis import judgement, refusals
-    from planar.solving.rates import regularity, sample_rates
+    from planar.solving.diagnosis import mobility, refusals
+    from planar.solving.rates import sample_rates
 else:  # few positions need them
     least_misfit = LazyModule("planar.solving.assembly.least_misfit")
-    judgement = LazyModule("planar.solving.diagnosis.judgement")
+    mobility = LazyModule("planar.solving.diagnosis.mobility")
     run_samples = LazyModule("planar.solving.continuation.run_samples")
     refusals = LazyModule("planar.solving.diagnosis.refusals")
-    regularity = LazyModule("planar.solving.rates.regularity")
     sample_rates = LazyModule("planar.solving.rates.sample_rates")
 
 
@@ -169,10 +168,6 @@ class PositionSolver(PreparedMechanism):
         """The remarks of the mechanism, and those on an assembly."""
         return (*self.mechanism.remarks, *sketch_remarks(self, assembly))
 
-    def block_regularity(self, z: Array) -> Array:
-        """How regular the Jacobian of each block is at unknowns z (blocks,)."""
-        return regularity.regularity(self, regularity.jacobian_at(self, z, self.inputs.u))
-
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
         if self.acceptance is not None:
@@ -202,7 +197,7 @@ class PositionSolver(PreparedMechanism):
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
             is_weak = block_regularity[stage.block_index] < MIN_REGULARITY
-            if is_weak and regularity.is_always_singular(self, stage, failure.z):
+            if is_weak and mobility.is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
         if self._is_contradicted(failure):
             return refusals.too_many_inputs(self)
@@ -249,7 +244,7 @@ class PositionSolver(PreparedMechanism):
             least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
         if not (self.functions.is_square and self._is_regular(z)):
-            mobility, refuse = judgement.judge_velocity(self, z)
+            mobility, refuse = refusals.judge_velocity(self, z)
             regular = None if refuse is None else self.regularized(z)
             if regular is not None:
                 return regular[0].state(regular[1], remarks)
@@ -267,7 +262,7 @@ class PositionSolver(PreparedMechanism):
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        refuse = judgement.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
+        refuse = refusals.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
         return refusals.not_closed(self, pair, residual) if refuse is None else refuse()
 
     def _sample_rates(self, z: Array, branch_rates: Mapping[int, BranchRates]) -> sample_rates.SampleRates:
@@ -286,9 +281,7 @@ class PositionSolver(PreparedMechanism):
         if ending is TrackingEnd.STOP and self.stops is not None:
             met = self.stops.describe_met(self.stop_positions(point.y[:-1], u))
             return refusals.motion_stopped(self, met, self.describe_inputs(u))
-        return refusals.motion_ended(
-            self, regularity.moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending
-        )
+        return refusals.motion_ended(self, [point.tangent[:-1]], self.describe_inputs(u), ending)
 
     def _singular_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
         """The state where one more than the inputs could move to first order, if only one motion goes on."""
@@ -421,9 +414,7 @@ class SolvedMechanism:
             z = self.assembly.z
         except NoAnswer:
             return False
-        from planar.solving.diagnosis.redundancy import is_rigid
-
-        return is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
+        return mobility.is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
 
     def motion_refusal(self, pair: str | None = None) -> NoAnswer | None:
         """Why no input can run from the mechanism's position, whatever its range; None where one can.
@@ -443,7 +434,7 @@ class SolvedMechanism:
         at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
         refusals_at_rest = solved_mechanism(at_rest)._refusals_at_rest
         if pair not in refusals_at_rest:
-            refusals_at_rest[pair] = judgement.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
+            refusals_at_rest[pair] = refusals.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
         return refusals_at_rest[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:

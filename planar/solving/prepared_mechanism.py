@@ -14,6 +14,7 @@ from planar.equations.coordinates import FRAME_PARTS, coordinate_columns, frames
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links, size_from_extents
 from planar.equations.residuals import pair_residuals, split_pair_numbers, wrapped_residual
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
@@ -35,6 +36,7 @@ from planar.model.mechanism import (
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
 from planar.solving.checks.residual_check import ResidualCheck, residual_tolerance, stack_motion
+from planar.solving.checks.singular_values import column_norms
 
 if TYPE_CHECKING:
     from planar.solving.stops import MetStop, PairStops
@@ -345,6 +347,30 @@ class PreparedMechanism:
     def min_column_scale(self) -> Array:
         """What the column of every unknown could be at best in its block, rows divided so (unknowns,)."""
         return self.acceptance_scales.column_floor
+
+    def block_regularity(self, z: Array, u: Array | None = None) -> Array:
+        """How regular the Jacobian of each block is (blocks,) at unknowns z and inputs u, or the file's own."""
+        u = self.inputs.u if u is None else u
+        return self.jacobian_regularity(self.functions.jacobians(z[None], u[None], self.inputs.p)[0][0])
+
+    def jacobian_regularity(self, jacobian: Array | SparseMatrices) -> Array:
+        """The least singular value of each block of a Jacobian (..., blocks), each column divided by what its links
+        could reach at best.
+
+        Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
+        their size nor that of the mechanism matters. `jacobian` is (..., rows, unknowns).
+        """
+        least_values: Array = np.ones((*jacobian.shape[:-2], len(self.equations.blocks)))
+        for index, block in enumerate(self.equations.blocks):
+            block_jacobian = jacobian[..., block.rows, block.unknowns] / self.row_scale[block.rows, None]
+            sizes = column_norms(block_jacobian, self.min_column_scale[block.unknowns])
+            rows, columns = block_jacobian.shape[-2:]
+            if rows < columns:
+                least_values[..., index] = 0.0
+            elif columns:
+                values = np.linalg.svd(block_jacobian / sizes[..., None, :], compute_uv=False)
+                least_values[..., index] = values[..., -1] / np.maximum(1.0, values[..., 0])
+        return least_values
 
     @property
     def row_pairs(self) -> list[str]:

@@ -24,7 +24,6 @@ from planar.solving.continuation.run_samples import (
     resting_inputs,
     unjudged_rows,
 )
-from planar.solving.continuation.solution_curve import CurvePoint
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MIN_WINDOW = 8
@@ -53,63 +52,47 @@ class PathFollower:
     ):
         speed = float(np.max(np.abs(direction), initial=0.0)) or 1.0
         self.tracker = CurveTracker(solver, z, start, direction / speed, branches, budget)
-        self.curve, self.point = self.tracker.curve, self.tracker.point
-        self.dead_point: CurvePoint | None = None
         self._pieces, self._period_search = path_pieces(self.tracker), PeriodSearch(self.tracker)
         self._piece: PathPiece | None = None
         self._period: Period | None = None
-        self._target = self._reached = 0.0
+        self._reached = 0.0
 
     def has_position(self, position: float) -> bool:
         """Whether a place lies on what has been followed already."""
         return self._piece is not None and (position <= self._piece.stop or self._period is not None)
 
     @property
-    def end_inputs(self) -> tuple[Array, TrackingEnd]:
-        """The inputs beyond which it does not go, and why."""
-        if self.dead_point is not None:
-            return self.curve.inputs(self.dead_point.y), TrackingEnd.DEAD_POINT
-        if self.tracker.limit is not None and self._target < self.tracker.limit:
-            return self.curve.inputs(self.point.y), TrackingEnd.OUT_OF_RANGE
-        return self.tracker.end_inputs
-
-    @property
-    def end_refusal(self) -> NoAnswer:
-        """Why it goes no further."""
-        u, ending = self.end_inputs
-        return self.tracker.end_refusal(u, self.point, ending)
-
-    @property
     def last_position(self) -> tuple[Array, Array] | None:
         """Unknowns and inputs of the last position before that; where a slide goes out without an end, of one well out.
         None where it has been beyond that already."""
-        point = self.point
-        if self.end_inputs[1] is TrackingEnd.ENDLESS:
+        point = self.tracker.point
+        if self.tracker.ending is TrackingEnd.ENDLESS:
             point = self.tracker.far_point or point
             if point.y[-1] <= self._reached:
                 return None
-        return point.y[:-1], self.curve.inputs(point.y)
+        return point.y[:-1], self.tracker.curve.inputs(point.y)
 
     def unknowns_at(self, position: float) -> tuple[Array, BranchRates | None] | None:
         """The unknowns so far along the path, with rates where the Jacobian is singular; None if it ends before."""
-        self._target = position
-        while self._piece is None or not self.has_position(position):
-            if self.dead_point is not None:
+        tracker, piece = self.tracker, self._piece
+        while piece is None or not self.has_position(position):
+            if tracker.ending is TrackingEnd.DEAD_POINT:
                 return None
-            before, self._piece = self._piece, next(self._pieces, None)
-            if self._piece is None:
-                at_stop = before is not None and self.tracker.ending is TrackingEnd.STOP
-                if not at_stop or before is None or position > before.stop + STOP_ROUNDING:
-                    return None
-                self._piece = before
-                break
-            self.dead_point = self._piece.dead_point
-            self.point = self.dead_point or self._piece.arc.after
-            self._period = self._period_search.period_after(self._piece)
+            following = next(self._pieces, None)
+            if following is None:
+                if tracker.ending is TrackingEnd.STOP and piece and position <= piece.stop + STOP_ROUNDING:
+                    break
+                if tracker.limit is not None and position < tracker.limit:
+                    tracker.limit, tracker.ending = None, TrackingEnd.OUT_OF_RANGE
+                return None
+            piece = self._piece = following
+            self._period = self._period_search.period_after(piece)
+            if piece.dead_point is not None:
+                tracker.point, tracker.ending = piece.dead_point, TrackingEnd.DEAD_POINT
         self._reached = position
-        if self._period is not None and position > self._piece.stop:
-            return self._period.unknowns_at(self.curve, position)
-        return self._piece.unknowns_at(self.curve, position)
+        if self._period is not None and position > piece.stop:
+            return self._period.unknowns_at(tracker.curve, position)
+        return piece.unknowns_at(tracker.curve, position)
 
     def bifurcations_until(self, last: float) -> tuple[PassedBifurcation, ...]:
         """The change points passed up to a place that it has come to."""
@@ -226,7 +209,7 @@ class _SamplesFollower:
         for place, following in chain([at_once], self._places):
             position = follower.unknowns_at(place)
             if position is None:
-                stopped = follower.end_refusal
+                stopped = follower.tracker.end_refusal()
                 break
             self.z[done], rates = position
             if rates is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +51,6 @@ class PathPiece(NamedTuple):
     stop: float
     dead_point: CurvePoint | None
 
-    def has_position(self, position: float) -> bool:
-        """Whether the inputs come to a place within this piece."""
-        return min(self.start, self.stop) <= position <= max(self.start, self.stop)
-
     def until(self, position: float) -> PathPiece:
         """The part of the piece up to a place of the inputs."""
         x = find_root(lambda x: self.arc.input_position(x) - position, self.first, self.last)
@@ -89,6 +85,13 @@ class PathPiece(NamedTuple):
         x, (low, high) = self.arc.place(y), sorted((self.first, self.last))
         slack = STRAIGHT_TOLERANCE * (high - low)
         return low - slack <= x <= high + slack
+
+
+def piece_at(pieces: Sequence[PathPiece], position: float) -> PathPiece:
+    """The piece on which the inputs are at a place, of pieces on which they go one way."""
+    sense = 1.0 if pieces[-1].stop >= pieces[0].start else -1.0
+    index = bisect_left(pieces, sense * position, key=lambda piece: sense * piece.stop)
+    return pieces[min(index, len(pieces) - 1)]
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
@@ -245,8 +248,7 @@ class Period(NamedTuple):
         them."""
         times = float(np.floor(position / self.length))
         within = position - times * self.length
-        index = min(bisect_left([piece.stop for piece in self.pieces], within), len(self.pieces) - 1)
-        z, branch_rates = self.pieces[index].unknowns_at(curve, within)
+        z, branch_rates = piece_at(self.pieces, within).unknowns_at(curve, within)
         z = z + times * self.growth[:-1]
         if branch_rates is None:
             # where many turns are counted, rounding of the place is more than that of the unknowns
@@ -327,22 +329,6 @@ def _whole_turns(tracker: CurveTracker, y: Array, start: CurvePoint) -> Array:
     return 2.0 * np.pi * turns
 
 
-class CircuitBranch(NamedTuple):
-    """A part of a circuit on which the input goes one way: to a dead point, or to the circuit's start."""
-
-    pieces: tuple[PathPiece, ...]
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Where the input starts and stops on its way."""
-        return self.pieces[0].start, self.pieces[-1].stop
-
-    def unknowns_at(self, curve: SolutionCurve, position: float) -> tuple[Array, BranchRates | None]:
-        """The unknowns where the input is at a place, with their rates where the Jacobian is singular."""
-        piece = next((piece for piece in self.pieces if piece.has_position(position)), self.pieces[-1])
-        return piece.unknowns_at(curve, position)
-
-
 class ClosedCircuit(NamedTuple):
     """The pieces of a closed curve in their order, and whether it starts in a dead point."""
 
@@ -350,19 +336,19 @@ class ClosedCircuit(NamedTuple):
     starts_at_dead_point: bool
 
     @property
-    def branches(self) -> tuple[CircuitBranch, ...]:
+    def branches(self) -> tuple[tuple[PathPiece, ...], ...]:
         """Its parts between dead points."""
         return split_at_dead_points(self.pieces)
 
 
-def split_at_dead_points(pieces: Iterable[PathPiece]) -> tuple[CircuitBranch, ...]:
-    """The branches to which the pieces of a curve belong, in their order."""
+def split_at_dead_points(pieces: Iterable[PathPiece]) -> tuple[tuple[PathPiece, ...], ...]:
+    """The pieces of a curve in their order, by branch: the input goes one way on each."""
     branches: list[list[PathPiece]] = [[]]
     for piece in pieces:
         branches[-1].append(piece)
         if piece.dead_point is not None:
             branches.append([])
-    return tuple(CircuitBranch(tuple(branch)) for branch in branches if branch and branch[0].start != branch[-1].stop)
+    return tuple(tuple(branch) for branch in branches if branch and branch[0].start != branch[-1].stop)
 
 
 def moving_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
@@ -396,5 +382,4 @@ def follow_circuit(tracker: CurveTracker) -> ClosedCircuit:
         if problem:
             remedy = "name where the range starts and stops instead of the circuit"
             raise NoAnswer(Outcome.BRANCH_LOST, f"{problem}; {remedy}")
-    u, ending = tracker.end_inputs
-    raise tracker.end_refusal(u, tracker.point, ending)
+    raise tracker.end_refusal()

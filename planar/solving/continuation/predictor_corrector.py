@@ -288,9 +288,10 @@ class CurveTracker:
         y = self.point.y if self.limit is None else np.append(self.point.y[:-1], self.limit)
         return self.curve.inputs(y), self.ending
 
-    def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
-        """What to say of a motion along the curve that ends at inputs u, and went as far as a point."""
-        return cast(_EndReporter, self.curve.solver).end_refusal(u, point, ending)
+    def end_refusal(self) -> NoAnswer:
+        """Why the motion along the curve ends."""
+        u, ending = self.end_inputs
+        return cast(_EndReporter, self.curve.solver).end_refusal(u, self.point, ending)
 
     def _slide_extent(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""

@@ -17,7 +17,6 @@ from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.run_samples import BranchRates, InputRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.regularity import regularity
 
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
@@ -49,7 +48,7 @@ def sample_rates(
     y = np.hstack([z, inputs.u])
     at_rest = functions.kinematics(y, np.hstack([rest, inputs.u1]), np.hstack([rest, inputs.u2]), p)
     jacobians = at_rest.jacobian
-    strength = regularity(setup, jacobians).min(axis=-1, initial=1.0)
+    strength = setup.jacobian_regularity(jacobians).min(axis=-1, initial=1.0)
     # near by, the rates along a branch are those of a linkage that has the change point exactly
     known = {
         row: in_time
@@ -180,7 +179,7 @@ def _error_amplification(setup: PreparedMechanism, jacobian: Array) -> tuple[Arr
     singular; rates that are made of such angles lose as much once more.
     """
     greatest, which = np.ones(len(jacobian)), np.zeros(len(jacobian), dtype=int)
-    strong, arms = regularity(setup, jacobian), np.ones((len(jacobian), jacobian.shape[2]))
+    strong, arms = setup.jacobian_regularity(jacobian), np.ones((len(jacobian), jacobian.shape[2]))
     for index, stage in enumerate(setup.equations.blocks):
         block_jacobian = jacobian[:, stage.rows, stage.unknowns]
         if block_jacobian.shape[-1]:

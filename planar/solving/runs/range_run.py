@@ -18,7 +18,7 @@ from planar.results.records import Limit
 from planar.solving.continuation.events import LimitSearch, LocatedLimit, distinct_limits
 from planar.solving.continuation.fast_path import fast_run
 from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
-from planar.solving.continuation.path_pieces import PathPiece, follow_circuit
+from planar.solving.continuation.path_pieces import PathPiece, follow_circuit, piece_at
 from planar.solving.continuation.predictor_corrector import (
     MAX_ARCS,
     SHOWN_SLIDE_EXTENT,
@@ -36,7 +36,6 @@ from planar.solving.continuation.run_samples import (
 )
 from planar.solving.diagnosis import refusals
 from planar.solving.position import solved_mechanism, stopped_at_start
-from planar.solving.rates.regularity import moved_links
 from planar.solving.runs.samples import build_motion
 
 RANGE_SAMPLES = 73
@@ -53,13 +52,13 @@ Progress = Callable[[float, float], None]
 
 class _RangeEnd(NamedTuple):
     """An end of a range: the unknowns and the position at its last row, why it ends, None where the input goes on; the
-    inputs beyond which it does not go, and the links that move there."""
+    inputs beyond which it does not go, and how the unknowns move there."""
 
     z: Array
     position: float
     ending: TrackingEnd | None
     limit: Array
-    links: tuple[str, ...] = ()
+    rates: Array
     nearby: tuple[NearbyBifurcation, ...] = ()
 
 
@@ -152,15 +151,15 @@ class RangeRun:
             raise BadInput("start", f"{problem} (`branches`, --branch), or start it elsewhere")
         circuit = follow_circuit(tracker)
         turn = np.inf if self.is_sliding else 2.0 * pi
-        spacing = min(max(abs(branch.ends[1] - branch.ends[0]) for branch in circuit.branches), turn) / steps
+        spacing = min(max(abs(branch[-1].stop - branch[0].start) for branch in circuit.branches), turn) / steps
         rows: list[tuple[Array, float, float]] = []
         branch_rates: dict[int, BranchRates] = {}
         dead_points = [0] if circuit.starts_at_dead_point else []
         for branch in circuit.branches:
-            begin, last = branch.ends
+            begin, last = branch[0].start, branch[-1].stop
             count = max(1, ceil(abs(last - begin) / spacing - STEP_ROUNDING))
             for place in np.linspace(begin, last, count + 1)[1 if rows else 0 :].tolist():
-                z, rates = branch.unknowns_at(tracker.curve, place)
+                z, rates = piece_at(branch, place).unknowns_at(tracker.curve, place)
                 if rates is not None:
                     branch_rates[len(rows)] = rates
                 rows.append((z, first + place, 1.0 if last > begin else -1.0))
@@ -230,17 +229,14 @@ class RangeRun:
             return self._rows(self._follow_from_file(grid))
         back = self._follow_from_file(grid[is_before][::-1])
         if back.stopped is not None:
-            raise self._start_problem(back, back.stopped)
+            self._rows(back)
+            raise back.stopped
         return _spliced(back, self._follow_from_file(grid[~is_before]))
-
-    def _start_problem(self, run: RunSamples, problem: NoAnswer) -> NoAnswer:
-        """What to say of a run that stopped: of one that did not start, if it is a change point that it stands on."""
-        return stopped_at_start(self.solver, self.z, problem) if len(run.z) < 2 else problem
 
     def _rows(self, run: RunSamples) -> RunSamples:
         """A run without its first position, which is no row. Raises NoAnswer where there is no other."""
         if len(run.z) < 2 and run.stopped is not None:
-            raise self._start_problem(run, run.stopped)
+            raise stopped_at_start(self.solver, self.z, run.stopped)
         return run.from_row(1)
 
     def _follow_from_file(self, grid: Array) -> RunSamples:
@@ -299,12 +295,8 @@ class RangeRun:
         if quick is not None and len(quick.z) == steps + 1 and quick.is_sure.all():
             return quick
         if quick is not None and len(quick.z) <= steps:
-            # walking tells it sooner than a run would
-            end = (
-                self._end_beyond(quick.z, places)
-                if self.solver.functions.is_sparse and len(quick.z)
-                else self._find_range_end(self.z, self.position, 1.0, 2.0 * pi)
-            )
+            # the curve shows it sooner than a run would
+            end = self._range_end_beyond(quick if self.solver.functions.is_sparse else None, self.z, places)
             if end.ending is not None:
                 return end
         run = self._run(places)
@@ -334,8 +326,7 @@ class RangeRun:
                     met = self.solver.stops.describe_met(self.solver.stop_positions(end.z, end.limit))
                     reasons.append(f"the range of {self.pair!r} ends at {place}, where {met}")
             elif ending is not None:
-                links = list(dict.fromkeys(link for end in alike for link in end.links))
-                problem = refusals.motion_ended(self.solver, links, where, ending)
+                problem = refusals.motion_ended(self.solver, [end.rates for end in alike], where, ending)
                 run = run._replace(stopped=problem)
                 reasons.append(problem.reason)
             if ending is TrackingEnd.ENDLESS:
@@ -359,35 +350,32 @@ class RangeRun:
         Steps along a curve of many unknowns are short: it is followed only where samples are not surely sound.
         """
         reach = SHOWN_SLIDE_EXTENT if self.is_sliding else 2.0 * pi
-        if self.solver.functions.is_sparse:
-            places = first + sense * np.linspace(0.0, reach, RANGE_SAMPLES)
-            quick = fast_run(self.solver, z, resting_inputs(self.inputs_at(places)))
-            if quick is not None and len(quick.z):
-                return self._end_beyond(quick.z, places)
-        return self._find_range_end(z, first, sense, reach)
+        places = first + sense * np.linspace(0.0, reach, RANGE_SAMPLES)
+        is_sparse = self.solver.functions.is_sparse
+        quick = fast_run(self.solver, z, resting_inputs(self.inputs_at(places))) if is_sparse else None
+        return self._range_end_beyond(quick, z, places)
 
-    def _end_beyond(self, samples: Array, places: Array) -> _RangeEnd:
-        """The same beyond samples (samples, unknowns) that are surely sound, the first at some places of the input."""
-        last = max(len(samples) - 2, 0)
-        reach = float(places[-1] - places[last])
-        return self._find_range_end(samples[last], float(places[last]), 1.0 if reach > 0.0 else -1.0, abs(reach))
-
-    def _find_range_end(self, z: Array, first: float, sense: float, reach: float) -> _RangeEnd:
-        """The same by following the curve so far."""
-        start = self.inputs_at(first)
+    def _range_end_beyond(self, quick: RunSamples | None, z: Array, places: Array) -> _RangeEnd:
+        """The same towards the last of some places of the input, from unknowns z at the first, or from the last rows of
+        a run through them that are surely sound."""
+        row = 0
+        if quick is not None and len(quick.z):
+            row = max(len(quick.z) - 2, 0)
+            z = quick.z[row]
+        first, last = float(places[row]), float(places[-1])
+        start, sense = self.inputs_at(first), 1.0 if last > first else -1.0
         direction = self.inputs_at(first + sense) - start
         follower = PathFollower(self.solver, z, start, direction, self.branches, self.arc_budget(0.0))
-        last = first + sense * reach
-        end = follower.unknowns_at(reach)
+        end = follower.unknowns_at(abs(last - first))
         if end is not None:
             if self.is_sliding:
                 problem = "the slide goes on without a limit; name where the range starts and stops"
                 raise BadInput(self.pair, problem)
-            return _RangeEnd(end[0], last, None, self.inputs_at(last))
-        limit, ending = follower.end_inputs
+            return _RangeEnd(end[0], last, None, self.inputs_at(last), np.zeros(len(z)))
+        limit, ending = follower.tracker.end_inputs
         z, u = follower.last_position or (z, start)
-        links = tuple(moved_links(self.solver, follower.point.tangent[:-1]))
-        return _RangeEnd(z, float(u[self.index]), ending, limit, links, tuple(follower.tracker.nearby))
+        point, nearby = follower.tracker.point, tuple(follower.tracker.nearby)
+        return _RangeEnd(z, float(u[self.index]), ending, limit, point.tangent[:-1], nearby)
 
 
 def _spliced(back: RunSamples, ahead: RunSamples) -> RunSamples:

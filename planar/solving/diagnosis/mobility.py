@@ -1,4 +1,4 @@
-"""What depends on what among the constraints and inputs of a mechanism: the smallest sets that hold one another."""
+"""What can move at a position of a mechanism: motions by rank, links left free, inputs that hold one another."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from planar.equations.functions import EquationRates
+from planar.equations.linear import solve_vectors
+from planar.equations.sparse_matrices import SparseMatrices
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism, pair_entries
 from planar.model.pairs import Pair
-from planar.solving.checks.singular_values import null_space
+from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, column_norms, null_space, rank
 from planar.solving.full_constraints import (
     PROBE_DISTANCE,
     FullConstraints,
@@ -17,6 +21,7 @@ from planar.solving.full_constraints import (
     motion_dimension,
     random_step,
 )
+from planar.solving.newton import correct_blocks
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 ZERO_COMPONENT = 1e-7
@@ -25,6 +30,87 @@ MAX_REMOVALS = 60
 """Links or pairs of a structure whose removal is tried."""
 MAX_COORDINATES = 200
 """Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
+NEIGHBOUR_DISTANCE = 1e-2
+"""How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
+
+
+def mobility_by_rank(setup: PreparedMechanism, motion: EquationRates) -> tuple[int, tuple[Block, ...]]:
+    """The mobility at a position, to first order, and the blocks that are singular there.
+
+    With the inputs' positions counted as unknowns, the pairs leave free unknowns + inputs - rank.
+    """
+    inputs = setup.inputs.u.size
+    is_block_weak = setup.jacobian_regularity(motion.jacobian) < MIN_REGULARITY
+    weak = tuple(block for block, is_weak in zip(setup.equations.blocks, is_block_weak, strict=True) if is_weak)
+    if weak:
+        jacobian = np.hstack([motion.jacobian, motion.input_jacobian])
+        total_rank = rank(_scaled_jacobian(setup, jacobian), MIN_REGULARITY, unit=1.0)
+        return len(setup.equations.unknowns) + inputs - total_rank, weak
+    if motion.jacobian.shape[0] == motion.jacobian.shape[1]:
+        return inputs, ()
+    # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
+    sizes = np.maximum(np.linalg.norm(motion.input_jacobian, axis=0), ZERO_REGULARITY)
+    rates = np.linalg.lstsq(motion.jacobian, motion.input_jacobian, rcond=1e-12)[0]
+    residual = (motion.input_jacobian - motion.jacobian @ rates) / sizes
+    return inputs - int(np.sum(np.linalg.svd(residual, compute_uv=False) > MIN_REGULARITY)), ()
+
+
+def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> Array:
+    """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
+
+    The size of an unknown's column is that in its own block, however large or small the things that hang on it are. A
+    column that could reach further than it does now keeps what it lacks: it is that which vanishes.
+    """
+    jacobian = np.asarray(jacobian)
+    scaled = jacobian / setup.row_scale[:, None]
+    sizes = np.maximum(np.linalg.norm(jacobian, axis=-2), 1.0)
+    for stage in setup.equations.blocks:
+        norms = column_norms(scaled[..., stage.rows, stage.unknowns], setup.min_column_scale[stage.unknowns])
+        sizes[..., stage.unknowns] = norms
+    return scaled / sizes[..., None, :]
+
+
+def input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
+    """Whether rates of the inputs that are more than the freedom do not contradict one another."""
+    residual = motion.F1 - motion.jacobian @ solve_vectors(motion.jacobian, motion.F1)
+    scale = np.max(np.abs(setup.inputs.u1), initial=0.0) or 1.0
+    return bool(np.max(np.abs(residual), initial=0.0) <= 1e-9 * scale)
+
+
+def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
+    """Whether a block is singular in closed positions near by too, so that it is no matter of this one."""
+    u, p = setup.inputs.u, setup.inputs.p
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        near = u + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, u.size)
+        beside = correct_blocks(
+            setup.functions,
+            p,
+            z + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, z.size),
+            near,
+            stage.block_index,
+        )
+        if beside is not None and setup.block_regularity(beside, near)[stage.block_index] > ZERO_REGULARITY:
+            return False
+    return True
+
+
+def links_free_at_rest(setup: PreparedMechanism, jacobian: Array | SparseMatrices) -> list[str]:
+    """The links that can move while the inputs are held, from the null vectors of the Jacobian."""
+    null = null_space(_scaled_jacobian(setup, jacobian), MIN_REGULARITY, unit=1.0)
+    return moved_links(setup, np.max(np.abs(null), axis=1)) if null.size else []
+
+
+def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
+    """The links that rates of the unknowns (unknowns,) move."""
+    share = np.abs(rates)
+    owners = [
+        setup.equations.coordinates[column].owner
+        for column, part in zip(setup.equations.unknowns, share, strict=True)
+        if part > 1e-3 * share.max()
+    ]
+    joined = [link for name in owners for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
+    return [link for link in dict.fromkeys(joined) if link != setup.mechanism.frame]
 
 
 def smallest_dependent_sets(
