@@ -127,7 +127,7 @@ def reduce_to_triangle(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 def regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
     """No more than the least singular value of a block, columns of one size, and how far along a direction it is one at
-    least (Weyl), see `solving.checks.branch_check`.
+    least (Weyl), see `solving.continuation.fast_path`.
 
     The distance has the sign of the block's determinant: on one branch it stays the same, and of two assemblies that a
     dead point brings together one has the other.

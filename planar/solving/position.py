@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
+from planar.equations.acceptance import InputSamples
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
 from planar.equations.symbolic_equations import slice_length
@@ -25,25 +26,24 @@ from planar.solving.checks.residual_check import stack_motion
 from planar.solving.checks.singular_values import MIN_REGULARITY, null_space
 from planar.solving.continuation.fast_path import (
     MIN_FAST_REGULARITY,
+    BranchRates,
     FastPosition,
+    InputRates,
     StraightPathCache,
     fast_position,
-    is_surely_regular,
 )
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
+    from planar.solving import full_constraints
     from planar.solving.assembly import least_misfit
-    from planar.solving.continuation import run_samples
-    from planar.solving.continuation.run_samples import BranchRates
     from planar.solving.continuation.solution_curve import CurvePoint
-    from planar.solving.diagnosis import mobility, refusals
+    from planar.solving.diagnosis import refusals
     from planar.solving.rates import sample_rates
 else:  # few positions need them
     least_misfit = LazyModule("planar.solving.assembly.least_misfit")
-    mobility = LazyModule("planar.solving.diagnosis.mobility")
-    run_samples = LazyModule("planar.solving.continuation.run_samples")
+    full_constraints = LazyModule("planar.solving.full_constraints")
     refusals = LazyModule("planar.solving.diagnosis.refusals")
     sample_rates = LazyModule("planar.solving.rates.sample_rates")
 
@@ -104,8 +104,6 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
 
     Raises NoAnswer where the mechanism cannot be assembled, or inputs leave it free or cannot be moved there.
     """
-    from planar.solving.full_constraints import FullConstraints
-
     known = solved_mechanism(mechanism)
     solver, z, remarks = known.solver, known.assembly.z, known.remarks
     if drives:
@@ -124,7 +122,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     if solver.is_deflated or solver.equations.open_rows:
         jacobian = np.asarray(solver.functions.residuals_and_jacobian(z, u, p)[1])
     else:
-        jacobian = FullConstraints(solver).jacobian(w)
+        jacobian = full_constraints.FullConstraints(solver).jacobian(w)
     mobility = null_space(jacobian).shape[1] if w.size else 0
     if np.any(solver.block_regularity(z) < MIN_REGULARITY):
         note = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"
@@ -170,13 +168,15 @@ class PositionSolver(PreparedMechanism):
 
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
-        if self.acceptance is not None:
-            return is_surely_regular(self, z)
-        return bool(self.block_regularity(z).min(initial=1.0) >= MIN_FAST_REGULARITY)
+        if self.acceptance is None:
+            return bool(self.block_regularity(z).min(initial=1.0) >= MIN_FAST_REGULARITY)
+        rest = np.zeros_like(self.inputs.u)
+        result = self.acceptance.position(z, InputSamples(self.inputs.u, rest, rest), self.acceptance_scales)[1]
+        return result.regularity >= MIN_FAST_REGULARITY
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""
-        return is_surely_regular(self, z) or bool(np.all(self.block_regularity(z) >= MIN_REGULARITY))
+        return self.is_surely_regular(z) or bool(np.all(self.block_regularity(z) >= MIN_REGULARITY))
 
     def regularized(self, z: Array) -> tuple[PositionSolver, Array] | None:
         """A solver, and the unknowns, for constraints that are singular at z and all along the motion from there; None
@@ -197,21 +197,15 @@ class PositionSolver(PreparedMechanism):
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
             is_weak = block_regularity[stage.block_index] < MIN_REGULARITY
-            if is_weak and mobility.is_always_singular(self, stage, failure.z):
+            if is_weak and full_constraints.is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
-        if self._is_contradicted(failure):
-            return refusals.too_many_inputs(self)
+        if slice_length(failure.stage.rows) > slice_length(failure.stage.unknowns):
+            # held more than once: by inputs that are more than the pairs leave free, or, where these leave nothing free
+            # by count, by dimensions that have to agree
+            bare = equation_functions(replace(self.mechanism, inputs=())).equations
+            if 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs):
+                return refusals.too_many_inputs(self)
         return refusals.not_assembled(self, failure)
-
-    def _is_contradicted(self, failure: AssemblySearchFailure) -> bool:
-        """Whether what does not close is held more than once because the inputs are more than the pairs leave free.
-
-        Where the pairs leave nothing free by count, it is their dimensions that have to agree.
-        """
-        if slice_length(failure.stage.rows) <= slice_length(failure.stage.unknowns):
-            return False
-        bare = equation_functions(replace(self.mechanism, inputs=())).equations
-        return 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
@@ -239,7 +233,9 @@ class PositionSolver(PreparedMechanism):
         """The state by the general checks, which say why where there is none."""
         residual, pair = self.worst_residual(z)
         if residual > self.tolerance:
-            raise self._open_refusal(z, residual, pair)
+            # what all but closes may not close since it is singular
+            refuse = refusals.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
+            raise refusals.not_closed(self, pair, residual) if refuse is None else refuse()
         if self.equations.open_rows:
             least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
@@ -254,21 +250,18 @@ class PositionSolver(PreparedMechanism):
                     raise refuse()
                 return state
         coordinate_rates, doubt = self._sample_rates(z, {})
-        if doubt is not None and doubt.errors.is_too_inexact[0]:
+        if doubt is not None and doubt.is_too_inexact[0]:
             raise doubt.refusal(self, 0, self.describe_position())
         if doubt is not None:
-            remarks = (*remarks, doubt.remark())
+            remarks += doubt.remarks(lambda _: "")
         return self._checked_state([rates[0] for rates in coordinate_rates], mobility, residual, remarks)
 
-    def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
-        """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        refuse = refusals.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
-        return refusals.not_closed(self, pair, residual) if refuse is None else refuse()
-
-    def _sample_rates(self, z: Array, branch_rates: Mapping[int, BranchRates]) -> sample_rates.SampleRates:
+    def _sample_rates(
+        self, z: Array, branch_rates: Mapping[int, BranchRates]
+    ) -> tuple[list[Array], sample_rates.AccuracyDoubts | None]:
         """The rates at one sample."""
         u, u1, u2 = (rates[None] for rates in self.inputs[:3])
-        inputs = run_samples.InputRates(u, u1, u2, 0.0 * u)
+        inputs = InputRates(u, u1, u2, 0.0 * u)
         return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
@@ -287,10 +280,10 @@ class PositionSolver(PreparedMechanism):
         """The state where one more than the inputs could move to first order, if only one motion goes on."""
         from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
 
-        s, rates = self.inputs, singular_rates(self, z)
-        if rates is None or (residual := self.max_residual(rates.z, s.u)) > self.tolerance:
+        s, position_and_rates = self.inputs, singular_rates(self, z)
+        if position_and_rates is None or (residual := self.max_residual(position_and_rates[0], s.u)) > self.tolerance:
             return None
-        y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
+        y, y1, y2 = (np.concatenate(parts) for parts in zip(position_and_rates, s[:3], strict=True))
         note = "to first order there is one more motion here; the rates are those of the only one that goes on"
         motion = self.functions.kinematics(y, y1, y2, s.p)
         return self._checked_state([motion.w, motion.w1, motion.w2], s.u.size, residual, (*remarks, note))
@@ -301,7 +294,7 @@ class PositionSolver(PreparedMechanism):
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
         residual = self.max_residual(z, self.inputs.u)
-        rates = [part[0] for part in self._sample_rates(z, {0: local}).coordinate_rates]
+        rates = [part[0] for part in self._sample_rates(z, {0: local})[0]]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
         return self._checked_state(rates, self.inputs.u.size, residual, ())
@@ -378,7 +371,7 @@ class SolvedMechanism:
         solver, assembly = self.plain_solver, self.nearest
         if not isinstance(assembly, Assembly):
             return solver, assembly
-        regular = None if is_surely_regular(solver, assembly.z) else solver.regularized(assembly.z)
+        regular = None if solver.is_surely_regular(assembly.z) else solver.regularized(assembly.z)
         if regular is not None:
             solver, assembly = regular[0], assembly._replace(z=regular[1])
         assembly.z.flags.writeable = False
@@ -414,7 +407,7 @@ class SolvedMechanism:
             z = self.assembly.z
         except NoAnswer:
             return False
-        return mobility.is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
+        return full_constraints.is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
 
     def motion_refusal(self, pair: str | None = None) -> NoAnswer | None:
         """Why no input can run from the mechanism's position, whatever its range; None where one can.

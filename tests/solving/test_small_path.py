@@ -15,8 +15,7 @@ from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
-from planar.solving.continuation.fast_path import fast_position, fast_run
-from planar.solving.continuation.run_samples import InputRates
+from planar.solving.continuation.fast_path import InputRates, fast_position, fast_run
 from planar.solving.position import PositionSolver, SolvedMechanism
 from tests.acceptance import spoil_runs
 from tests.builders import four_bar

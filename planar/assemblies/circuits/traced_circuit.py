@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd, join_names
-from planar.solving.continuation.path_pieces import (
+from planar.solving.continuation.path import (
     MAX_PIECES,
     PathPiece,
     follow_circuit,

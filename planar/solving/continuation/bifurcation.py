@@ -61,15 +61,6 @@ SETTLED_DIRECTION = 1e-9
 MAX_REFINEMENTS, CONVERGED_STEP = 12, 1e-13
 
 
-class BifurcationCandidate(NamedTuple):
-    """The point nearest to which the Jacobian has more than one null vector, those (n + 1, k), and what the constraints
-    leave open there: nothing but rounding at a change point, more where the curve only comes near one."""
-
-    y: Array
-    null: Array
-    residual: float
-
-
 class Bifurcation(NamedTuple):
     """A change point with the ways through it, points at one place whose tangents are the ways: first the one that
     leads from where the walk came.
@@ -84,38 +75,41 @@ class Bifurcation(NamedTuple):
     rank_loss: int
 
 
-def bifurcation_candidates(curve: SolutionCurve, point: CurvePoint, farthest: float) -> Iterator[BifurcationCandidate]:
-    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds by steps
-    no longer than `farthest`.
+def bifurcation_candidates(curve: SolutionCurve, point: CurvePoint, farthest: float) -> Iterator[ConstraintsAt]:
+    """The points next to this one at which the Jacobian has more than one null vector, those to which Newton's method
+    converges by steps no longer than `farthest`.
+
+    The constraints leave nothing but rounding open there at a change point, more where the curve only comes near one.
 
     Each of the least singular values that is small is brought to zero; where several loops come near a change point at
     once, each is found.
     Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
     y = point.y + min(point.regular_distance, 0.1) * point.tangent
-    start = _decompose(curve, y)
+    start = constraints_at(curve, y)
     small = start.values < min(SMALL_SINGULAR_VALUE * start.greatest, ALIKE_RATIO * start.values[-1])
     if MOST_SMALL_VALUES <= small.sum() <= MOST_ALIKE_VALUES:
-        candidate = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
+        candidate = _refine_candidate(curve, start, start.right[-1 - small.sum() :].T, farthest)
         if candidate is not None:
             yield candidate
     for second in range(2, min(len(start.right), LEAST_VALUES + 1) + 1):
         if second > 2 and start.values[1 - second] > SMALL_SINGULAR_VALUE * start.greatest:
             return
-        candidate = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
+        candidate = _refine_candidate(curve, start, start.right[[-second, -1]].T, farthest)
         if candidate is None and 2 < second <= MOST_SMALL_VALUES:
-            candidate = _refine_candidate(curve, y, start.right[-second:].T, start, farthest)
+            candidate = _refine_candidate(curve, start, start.right[-second:].T, farthest)
         if candidate is not None and candidate.null.shape[1] > 2:
-            candidate = _refine_candidate(curve, candidate.y, candidate.null)
+            candidate = _refine_candidate(curve, candidate, candidate.null)
         if candidate is not None:
             yield candidate
 
 
-class _Decomposition(NamedTuple):
-    """The constraints at a point: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those on
-    the left as columns and those on the right as rows; the least ones alone where unknowns are many. `greatest` is no
-    less than the greatest of them, or than one."""
+class ConstraintsAt(NamedTuple):
+    """The constraints at a point y: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those
+    on the left as columns and those on the right as rows; the least ones alone where unknowns are many. `greatest` is
+    no less than the greatest of them, or than one."""
 
+    y: Array
     residual: Array
     jacobian: Array | SparseMatrices
     left: Array
@@ -128,54 +122,50 @@ class _Decomposition(NamedTuple):
         """The null vectors of J (n + 1, k)."""
         return self.right[int(np.sum(self.values > SINGULAR_TOLERANCE * self.greatest)) :].T
 
+    @property
+    def gap(self) -> float:
+        """What the worst constraint leaves open."""
+        return greatest_size(self.residual)
 
-def _decompose(curve: SolutionCurve, y: Array, count: int = LEAST_VALUES) -> _Decomposition:
+
+def constraints_at(curve: SolutionCurve, y: Array, count: int = LEAST_VALUES) -> ConstraintsAt:
     """The constraints at y, with `count` of the least singular values where unknowns are many."""
     residual, jacobian = curve.residuals_and_jacobian(y)
     if isinstance(jacobian, SparseMatrices):
         try:
             vectors = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(count)
-            return _Decomposition(residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
+            return ConstraintsAt(y, residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
         except ValueError:
             jacobian = np.asarray(jacobian)
     left, values, right = np.linalg.svd(jacobian)
-    return _Decomposition(residual, jacobian, left, values, right, max(values[0], 1.0) if values.size else 1.0)
+    return ConstraintsAt(y, residual, jacobian, left, values, right, max(values[0], 1.0) if values.size else 1.0)
 
 
 def _refine_candidate(
-    curve: SolutionCurve,
-    y: Array,
-    null_start: Array,
-    start: _Decomposition | None = None,
-    longest_step: float = 1.0,
-) -> BifurcationCandidate | None:
-    """The point next to y, where the constraints are as at the `start`, at which the Jacobian has null vectors next to
-    these (n + 1, k); None where Newton's method does not settle by steps no longer than the longest.
-    """
-
+    curve: SolutionCurve, start: ConstraintsAt, null_start: Array, longest_step: float = 1.0
+) -> ConstraintsAt | None:
+    """The point next to a start at which the Jacobian has null vectors next to these (n + 1, k); None where Newton's
+    method does not settle by steps no longer than the longest."""
     count = null_start.shape[1] + MORE_VALUES
 
-    def step_at(tried: Array) -> tuple[Array, Array]:
-        constraints = start if start is not None and tried is y else _decompose(curve, tried, count)
-        return _step_to_lower_rank(curve, tried, constraints, null_start), np.zeros((0, 0))
+    def step_at(y: Array) -> tuple[Array, Array]:
+        constraints = start if y is start.y else constraints_at(curve, y, count)
+        return _step_to_lower_rank(curve, constraints, null_start), np.zeros((0, 0))
 
-    settled_at = (len(y), CONVERGED_STEP)
-    settled, is_settled = settle(step_at, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
-    if not is_settled:
-        return None
-    decomposition = _decompose(curve, settled)
-    gap = float(np.max(np.abs(decomposition.residual), initial=0.0))
-    return BifurcationCandidate(settled, decomposition.null, gap) if decomposition.null.shape[1] > 1 else None
+    settled_at = (len(start.y), CONVERGED_STEP)
+    y, is_settled = settle(step_at, lambda _, step: step, start.y, MAX_REFINEMENTS, settled_at, longest_step)
+    candidate = constraints_at(curve, y) if is_settled else None
+    return candidate if candidate is not None and candidate.null.shape[1] > 1 else None
 
 
-def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposition, null_start: Array) -> Array:
+def _step_to_lower_rank(curve: SolutionCurve, constraints: ConstraintsAt, null_start: Array) -> Array:
     """A step of Newton's method for the rank of the Jacobian, after Lyapunov and Schmidt.
 
     Of the singular vectors those next to the null vectors that are sought, N on the right and L on the left, are set
     apart. The step closes F along all others, and moves along N so that L^T J N vanishes to first order. Where L^T F
     stays open the curve only comes near a change point. Further singular values that are zero close nothing.
     """
-    residual, jacobian, left, values, right, greatest = constraints
+    y, residual, jacobian, left, values, right, greatest = constraints
     nearest = np.argsort(-np.linalg.norm(right @ null_start, axis=1), kind="stable")[: null_start.shape[1]]
     others = np.setdiff1d(np.arange(len(values)), nearest)
     null, left_null = right[nearest].T, np.delete(left, others, axis=1)
@@ -270,27 +260,20 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
 
 def _conditions_at_start(curve: SolutionCurve, y: Array) -> _BranchConditions | None:
     """The conditions at the change point on which a position lies to rounding; None where it is none."""
-    start = _decompose(curve, y)
+    start = constraints_at(curve, y)
     counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
-    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
+    refined = (_refine_candidate(curve, start, start.right[-count:].T) for count in counts)
     near = next((candidate for candidate in refined if candidate is not None), None)
     if near is not None and near.null.shape[1] > 2:
-        near = _refine_candidate(curve, near.y, near.null)
-    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
+        near = _refine_candidate(curve, near, near.null)
+    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.gap > curve.solver.tolerance:
         return None
     return _BranchConditions(curve, near.y)
 
 
-class SingularRates(NamedTuple):
-    """A position at a singularity, to round-off, with the rates of the one motion that goes on through it."""
-
-    z: Array
-    z1: Array
-    z2: Array
-
-
-def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
-    """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
+def singular_rates(setup: PreparedMechanism, z: Array) -> tuple[Array, Array, Array] | None:
+    """A singular position near z, to round-off, of one freedom more than inputs, with the first and second rates of the
+    one motion through it; None if it is not one."""
     u1, u2 = setup.inputs.u1, setup.inputs.u2
     if not u1.size:
         return None  # no input says which way
@@ -314,8 +297,8 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     second = (branch.curvature[:-1] - first * t2) / t1**2
     z = branch.y[:-1] - t * first
     if speed > 0.0:
-        return SingularRates(z, first * speed, (second + first * along) * speed**2)
-    return SingularRates(z, 0.0 * first, first * gain)
+        return z, first * speed, (second + first * along) * speed**2
+    return z, 0.0 * first, first * gain
 
 
 def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bool:

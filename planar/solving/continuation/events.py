@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root_by_slope, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import count_phrase, join_all_names
 from planar.results.records import Limit
-from planar.solving.continuation.path_pieces import PathPiece, PeriodSearch, path_pieces
+from planar.solving.continuation.path import PathPiece, PeriodSearch, path_pieces
 from planar.solving.continuation.predictor_corrector import (
     END_TOLERANCE,
     CurveTracker,
@@ -150,17 +150,20 @@ class LimitSearch:
         curve, passed_count = self.curve, 0
         if begin is not None and begin.is_dead_point:
             yield self._located("input dead point", self.pair, begin)
-        before: _PieceEnd | None = None
+        before: CurvePoint | None = None
+        rates_before: Array = np.zeros((0, 3))
         for piece in pieces:
             arc = piece.arc
             if before is None or arc.is_exact:
-                before = self._piece_end(arc.point_at(curve, piece.first, False))
-            last_point = piece.dead_point or (arc.after if piece.last == arc.ends[1] else None)
-            after = self._piece_end(last_point or arc.point_at(curve, piece.last, False))
-            for k, output in enumerate(self.outputs):
-                for x in self._turning_points(piece, (before, after), k):
+                before = arc.point_at(curve, piece.first, False)
+                rates_before = pair_motions_at(self.outputs, curve, before)
+            after = piece.dead_point or (arc.after if piece.last == arc.ends[1] else None)
+            after = after or arc.point_at(curve, piece.last, False)
+            rates_after = pair_motions_at(self.outputs, curve, after)
+            for output, at_first, at_last in zip(self.outputs, rates_before, rates_after, strict=True):
+                for x in self._turning_points(piece, output, ((before, at_first), (after, at_last))):
                     point = arc.point_at(curve, x, False)
-                    yield self._located("stroke end", output.name, point, float(self._output_rates(point, k)[0]))
+                    yield self._located("stroke end", output.name, point, self._output_rates(output, point)[0])
             for passed in self.tracker.passed_until(last)[passed_count:]:
                 if not (passed.is_start or np.array_equal(passed.bifurcation.y, arc.after.y)):
                     break  # farther on: a walk that has gone its whole way knows them all
@@ -169,70 +172,58 @@ class LimitSearch:
                 passed_count += 1
             if piece.dead_point is not None and piece.first != piece.last:
                 yield self._located("input dead point", self.pair, piece.dead_point)
-            before = after
-        yield from self._at_end()
-
-    def _at_end(self) -> Iterator[LocatedLimit]:
-        """What ends the walk: stops, or that it was followed no further."""
+            before, rates_before = after, rates_after
         point, ending = self.tracker.point, self.tracker.ending
         if ending is TrackingEnd.STOP:
             for stop in self.setup.stops_at(point.y[:-1], self.curve.inputs(point.y)):
                 yield self._located("stop", stop.pair, point, stop.position)
         elif ending in (TrackingEnd.WORK_LIMIT, TrackingEnd.INTERRUPTED):
-            remark = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
+            reason = ": it takes more work than one answer may; name a nearer range"
             if ending is TrackingEnd.INTERRUPTED:
-                remark = "what lies beyond was not followed, as the computation was ended"
+                reason = ", as the computation was ended"
+            remark = f"what lies beyond was not followed{reason}"
             yield self._located("not followed further", self.pair, point, None, remark)
 
-    def _piece_end(self, point: CurvePoint) -> _PieceEnd:
-        return _PieceEnd(point, pair_motions_at(self.outputs, self.curve, point))
+    def _output_rates(self, output: Pair, point: CurvePoint) -> list[float]:
+        """Position, first and second derivative by arc length of one output, SI."""
+        return pair_motions_at((output,), self.curve, point)[0].tolist()
 
-    def _output_rates(self, point: CurvePoint, k: int) -> Array:
-        """Position, first and second derivative by arc length of one output (3,), SI."""
-        rates: Array = pair_motions_at(self.outputs[k : k + 1], self.curve, point)[0]
-        return rates
-
-    def _turning_points(self, piece: PathPiece, ends: tuple[_PieceEnd, _PieceEnd], k: int) -> Iterator[float]:
-        """Where on a piece an output turns back: places on the arc's axis."""
+    def _turning_points(
+        self, piece: PathPiece, output: Pair, ends: tuple[tuple[CurvePoint, Array], tuple[CurvePoint, Array]]
+    ) -> Iterator[float]:
+        """Where on a piece an output turns back: places on the arc's axis; `ends` are points, with the position and the
+        rates of the output there (3,)."""
         arc = piece.arc
-        (_, g0, s0), (_, g1, s1) = (end.output_rates[k] for end in ends)
-        standing = STANDING_RATE * (self.setup.unit if self.outputs[k].input_kind is MeasureKind.LENGTH else 1.0)
-        sense = 1.0 if piece.last > piece.first else -1.0
+        (before, (_, g0, s0)), (after, (_, g1, s1)) = ends
+        standing = STANDING_RATE * (self.setup.unit if output.input_kind is MeasureKind.LENGTH else 1.0)
 
         def rate_and_slope(x: float) -> tuple[float, float]:
             point = arc.point_at(self.curve, x, False)
-            _, rate, second = self._output_rates(point, k)
-            return float(rate), float(second / (arc.axis @ point.tangent))
+            _, rate, second = self._output_rates(output, point)
+            return rate, second / float(arc.axis @ point.tangent)
 
         if max(abs(g0), abs(g1)) < standing:
             return
         # where a piece starts or ends in the very turn, the sign of its rate there is rounding
         zero = ROUNDING_RATE * standing / STANDING_RATE
-        for end, x, g, s in ((ends[0], piece.first, g0, s0), (ends[1], piece.last, g1, s1)):
-            if abs(g) < zero and abs(s) > standing and not end.point.is_dead_point:
+        for point, x, g, s in ((before, piece.first, g0, s0), (after, piece.last, g1, s1)):
+            if abs(g) < zero and abs(s) > standing and not point.is_dead_point:
                 yield x
                 return
         # what only turns back since the input does, at a dead point, has no end of its stroke there
-        g0 = zero * s0 if abs(g0) < zero and ends[0].point.is_dead_point else g0
-        g1 = -zero * s1 if abs(g1) < zero and ends[1].point.is_dead_point else g1
+        g0 = zero * s0 if abs(g0) < zero and before.is_dead_point else g0
+        g1 = -zero * s1 if abs(g1) < zero and after.is_dead_point else g1
         if g0 * g1 < 0.0:
             yield find_root_by_slope(rate_and_slope, (piece.first, piece.last), (g0, g1))
         elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
             # both ends go one way, but the output may have gone back in between
             length, up = abs(piece.last - piece.first), float(np.sign(g0))
             lowest, part = lowest_on_cubic((up * g0, up * s0 * length), (up * g1, up * s1 * length))
-            middle = piece.first + sense * part * length
+            middle = piece.first + part * (piece.last - piece.first)
             rate_at_middle = rate_and_slope(middle)[0] if lowest < 0.0 else 0.0
             if up * rate_at_middle < -standing:
                 yield find_root_by_slope(rate_and_slope, (piece.first, middle), (g0, rate_at_middle))
                 yield find_root_by_slope(rate_and_slope, (middle, piece.last), (rate_at_middle, g1))
-
-
-class _PieceEnd(NamedTuple):
-    """An end of a piece of the curve, and how the outputs move there (outputs, 3)."""
-
-    point: CurvePoint
-    output_rates: Array
 
 
 def distinct_limits(pair: str, curve: SolutionCurve, limits: Iterable[LocatedLimit]) -> tuple[Limit, ...]:
@@ -249,10 +240,8 @@ def _is_same_limit(one: LocatedLimit, other: LocatedLimit) -> bool:
     if one.limit[:2] != other.limit[:2] or abs(one.limit.input - other.limit.input) >= END_TOLERANCE:
         return False
     # of two assemblies some link stands elsewhere, whole turns aside
-    return (
-        float(np.max(np.abs(np.sin(0.5 * (one.point.y[:-1] - other.point.y[:-1]))), initial=0.0))
-        < SAME_ASSEMBLY_TOLERANCE
-    )
+    turned = np.sin(0.5 * (one.point.y[:-1] - other.point.y[:-1]))
+    return greatest_size(turned) < SAME_ASSEMBLY_TOLERANCE
 
 
 def _name_stroke_ends(curve: SolutionCurve, pair: str, limits: list[LocatedLimit]) -> Iterator[Limit]:
@@ -297,20 +286,19 @@ def change_point_remarks(
     setup: PreparedMechanism, passed: Sequence[PassedBifurcation], nearby: Sequence[NearbyBifurcation]
 ) -> tuple[str, ...]:
     """What to say of change points on the way, and near it."""
-    remarks: dict[str, None] = {}
-    for bifurcation in passed:
-        remarks[change_point_remark(setup, bifurcation)] = None
-    for near in nearby:
-        if near.distance < REMARKED_DISTANCE:
-            remarks[
-                f"the motion comes within {near.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
-                f"point of a linkage that differs from this one by {near.residual * setup.unit:.1g} m"
-            ] = None
+    if not passed and not nearby:
+        return ()
+    remarks = [change_point_remark(setup, bifurcation) for bifurcation in passed]
+    remarks += [
+        f"the motion comes within {near.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
+        f"point of a linkage that differs from this one by {near.residual * setup.unit:.1g} m"
+        for near in nearby
+        if near.distance < REMARKED_DISTANCE
+    ]
+    remarks = list(dict.fromkeys(remarks))
     if len(remarks) > MAX_REMARKS:
-        return (
-            *list(remarks)[:MAX_REMARKS],
-            f"and so on at {count_phrase(len(remarks) - MAX_REMARKS, 'more place')}; see the motion's limits",
-        )
+        rest = f"and so on at {count_phrase(len(remarks) - MAX_REMARKS, 'more place')}; see the motion's limits"
+        remarks[MAX_REMARKS:] = [rest]
     return tuple(remarks)
 
 

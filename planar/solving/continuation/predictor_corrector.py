@@ -175,8 +175,7 @@ class CurveTracker:
         self.step = FIRST_STEP
         self._last_search_distance, self._approaching = np.inf, False
         self._start_arc: Arc | None = None
-        self.point = self._start_point(np.append(z, 0.0))
-        self._choose_start_branch()
+        self._set_start(np.append(z, 0.0))
         self.ending = TrackingEnd.BRANCH_LOST
         self.limit: float | None = None
         "the place of the inputs to which the curve tends while a slide goes out without an end"
@@ -190,18 +189,28 @@ class CurveTracker:
         self.is_periodic = np.append(equations.unknown_is_angle, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
-    def _start_point(self, y: Array) -> CurvePoint:
-        """The point at y, to be left so that the inputs go on.
+    def _set_start(self, y: Array) -> None:
+        """Start at y, so that the inputs go on; by a number taken off `branches` where several branches lead on.
 
-        At a dead point two ways lead on: the first so that the most moved unknown grows, the second by a number taken
-        off `branches`.
+        Of the two at a dead point the first is that on which the most moved unknown grows.
         """
-        point = self.curve.point_at(y, input_axis(len(y)))
-        if not point.is_dead_point or point.regular_distance <= AT_BIFURCATION_DISTANCE:
-            return point
-        fastest = int(np.argmax(np.abs(point.tangent)))
-        takes_second = bool(self.branches) and self.branches.pop(0) > 1
-        return point if bool(point.tangent[fastest] > 0.0) is not takes_second else point.reversed()
+        self.point = self.curve.point_at(y, input_axis(len(y)))
+        is_singular = self.point.regular_distance < AT_BIFURCATION_DISTANCE
+        if self.point.is_dead_point and not is_singular:
+            grows = bool(self.point.tangent[int(np.argmax(np.abs(self.point.tangent)))] > 0.0)
+            takes_second = bool(self.branches) and self.branches.pop(0) > 1
+            self.point = self.point.reversed() if grows is takes_second else self.point
+        bifurcation = bifurcation_at_start(self.curve, y) if self.branches and is_singular else None
+        if bifurcation is None:
+            return
+        number = self.branches[0]
+        index = min(number, len(bifurcation.branches)) - 1
+        branch = bifurcation.branches[index]
+        arc = branch_crossing(self.curve, branch, bifurcation.rank_loss)
+        if arc is not None:
+            del self.branches[0]
+            self.point, self._start_arc = branch, arc._replace(before=branch)
+            self._note_passed(bifurcation, index, is_start=True, beyond=number > len(bifurcation.branches))
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
@@ -241,7 +250,9 @@ class CurveTracker:
                 elif extent > farthest:
                     self.ending = TrackingEnd.OUT_OF_RANGE
                 return
-            self._update_nearby(after)
+            for k, near in enumerate(self.nearby):
+                distance = float(np.linalg.norm(after.y - near.y))
+                self.nearby[k] = near._replace(distance=min(near.distance, distance))
             self._approaching = after.regular_distance < point.regular_distance
             arc = arc_between(point, after)
             if self.far_point is None and self._slide_extent(after.y) > shown_extent:
@@ -257,22 +268,6 @@ class CurveTracker:
     def starts_on_bifurcation(self) -> bool:
         """Whether it starts on a change point, by a way that was asked for."""
         return self._start_arc is not None
-
-    def _choose_start_branch(self) -> None:
-        """Start by the way of the next number where that is asked for and the start is a change point."""
-        if not (self.branches and self.point.regular_distance < AT_BIFURCATION_DISTANCE):
-            return
-        bifurcation = bifurcation_at_start(self.curve, self.point.y)
-        if bifurcation is None:
-            return
-        number = self.branches[0]
-        index = min(number, len(bifurcation.branches)) - 1
-        branch = bifurcation.branches[index]
-        arc = branch_crossing(self.curve, branch, bifurcation.rank_loss)
-        if arc is not None:
-            del self.branches[0]
-            self.point, self._start_arc = branch, arc._replace(before=branch)
-            self._note_passed(bifurcation, index, is_start=True, beyond=number > len(bifurcation.branches))
 
     def _note_passed(self, bifurcation: Bifurcation, index: int, is_start: bool, beyond: bool) -> None:
         u, direction = self.curve.inputs(bifurcation.y), self.curve.input_direction
@@ -338,20 +333,14 @@ class CurveTracker:
             distance = float(np.linalg.norm(near.y - point.y))
             if not float(point.tangent @ (near.y - point.y)) > 0.0 or distance > farthest:
                 continue
-            if near.residual > curve.solver.tolerance or not curve.is_closed(near.y):
+            if near.gap > curve.solver.tolerance or not curve.is_closed(near.y):
                 self.nearby = [other for other in self.nearby if np.linalg.norm(other.y - near.y) > 1e-6]
-                self.nearby.append(NearbyBifurcation(near.y, distance, near.residual))
+                self.nearby.append(NearbyBifurcation(near.y, distance, near.gap))
                 continue
             bifurcation = bifurcation_ahead(curve, point, near.y)
             if bifurcation is not None:
                 return bifurcation
         return None
-
-    def _update_nearby(self, after: CurvePoint) -> None:
-        """How near the walk comes to change points of neighbouring linkages."""
-        for k, near in enumerate(self.nearby):
-            distance = float(np.linalg.norm(after.y - near.y))
-            self.nearby[k] = near._replace(distance=min(near.distance, distance))
 
 
 def _input_limit(point: CurvePoint, slide: int) -> float | None:

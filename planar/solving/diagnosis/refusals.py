@@ -25,9 +25,9 @@ from planar.solving.checks.residual_check import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
-    from planar.solving.diagnosis import mobility
+    from planar.solving import full_constraints
 else:  # what finds causes is loaded only when something is refused
-    mobility = LazyModule("planar.solving.diagnosis.mobility")
+    full_constraints = LazyModule("planar.solving.full_constraints")
 
 MAX_BRANCHES_LISTED = 4
 """Branches that are listed one by one."""
@@ -47,14 +47,14 @@ def judge_motion(setup: PreparedMechanism, z: Array, pair: str | None = None) ->
     if setup.equations.open_rows:  # lengths that do not agree count as if they did
         return None if names else always_free(setup, links)
     w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p)
-    motions = mobility.count_motions(setup, w)
+    motions = full_constraints.count_motions(setup, w)
     if motions == 0 or (motions is None and not names):
         return structure(setup, w)
     if not names:
         return always_free(setup, links)
     if motions is None or motions >= len(names):
         return None
-    if any(mobility.can_move_alone(setup, w, name) for name in (names if pair is None else [pair])):
+    if any(full_constraints.can_move_alone(setup, w, name) for name in (names if pair is None else [pair])):
         return None
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
@@ -73,21 +73,19 @@ def judge_velocity(setup: PreparedMechanism, z: Array) -> tuple[int, Callable[[]
     # the unknowns rest while the inputs move
     y, y1, y2 = (np.concatenate(parts) for parts in ((z, s.u), (rest, s.u1), (rest, s.u2)))
     motion = setup.functions.kinematics(y, y1, y2, s.p)
-    freedoms, weak = mobility.mobility_by_rank(setup, motion)
+    freedoms, weak = full_constraints.mobility_by_rank(setup, motion)
     if not weak:
-        agrees = freedoms >= s.u.size or mobility.input_rates_agree(setup, motion)
+        agrees = freedoms >= s.u.size or full_constraints.input_rates_agree(setup, motion)
         return freedoms, None if agrees else lambda: disagreeing_inputs(setup, freedoms, "velocities")
 
     def refuse() -> NoAnswer:
-        links = mobility.links_free_at_rest(setup, motion.jacobian)
+        links = full_constraints.links_free_at_rest(setup, motion.jacobian)
         links = links or list(dict.fromkeys(link for block in weak for link in block.links))
         if freedoms <= s.u.size:
             return dead_point(setup, links)
-        count = mobility.count_motions(setup, motion.w)
-        always = (
-            any(mobility.is_always_singular(setup, block, z) for block in weak) if count is None else count > s.u.size
-        )
-        if always:
+        count = full_constraints.count_motions(setup, motion.w)
+        is_free = count is not None and count > s.u.size
+        if is_free or (count is None and any(full_constraints.is_always_singular(setup, block, z) for block in weak)):
             return always_free(setup, links, motion.w)
         return change_point(setup, links, freedoms, z)
 
@@ -188,7 +186,7 @@ def always_free(setup: PreparedMechanism, links: Sequence[str], w: Array | None 
 
 def jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free; w as for `always_free`."""
-    jam = mobility.find_jammed_inputs(setup, w)
+    jam = full_constraints.find_jammed_inputs(setup, w)
     if jam is None:
         return None
     names, links = jam
@@ -218,7 +216,7 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
 def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     """What to remove from a structure: its inputs, or what lets it move."""
     mechanism = setup.mechanism
-    link, pairs = mobility.releasing_parts(setup, w)
+    link, pairs = full_constraints.releasing_parts(setup, w)
     removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
     if link is not None:
         removal = f"link {link!r} with its {removal}"
@@ -278,7 +276,7 @@ def dead_point(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
 def motion_ended(setup: PreparedMechanism, rates: Sequence[Array], where: str, ending: TrackingEnd) -> NoAnswer:
     """Where motions of the inputs end: a dead point, the infinite, or branches that cannot be told apart; each with the
     rates of its unknowns there (unknowns,)."""
-    links = list(dict.fromkeys(link for of_motion in rates for link in mobility.moved_links(setup, of_motion)))
+    links = list(dict.fromkeys(link for of_motion in rates for link in full_constraints.moved_links(setup, of_motion)))
     drive, outcome = _offered_pairs(setup, links, 4), Outcome.BRANCH_LOST
     if ending is TrackingEnd.DEAD_POINT:
         outcome = Outcome.DEAD_POINT
@@ -398,13 +396,13 @@ def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:
 
 def _surplus_inputs(setup: PreparedMechanism) -> str:
     """What to say of inputs that move one another while other links are free."""
-    sets = mobility.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
+    sets = full_constraints.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
     return f", and leave one out of those at {quote_names(sets[0])}, which move one another" if sets else ""
 
 
 def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     """Which inputs conflict, and what to do about it."""
-    sets = mobility.find_conflicting_inputs(setup)
+    sets = full_constraints.find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
     clauses = [

@@ -16,23 +16,28 @@ from planar.model.wording import join_all_names
 from planar.results.motion import Motion
 from planar.results.records import Limit
 from planar.solving.continuation.events import LimitSearch, LocatedLimit, distinct_limits
-from planar.solving.continuation.fast_path import fast_run
-from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
-from planar.solving.continuation.path_pieces import PathPiece, follow_circuit, piece_at
+from planar.solving.continuation.fast_path import (
+    BranchRates,
+    InputRates,
+    RunSamples,
+    fast_run,
+    join_runs,
+    resting_inputs,
+    unjudged_rows,
+)
+from planar.solving.continuation.path import (
+    PathFollower,
+    follow_circuit,
+    follow_samples,
+    follow_to,
+    piece_at,
+)
 from planar.solving.continuation.predictor_corrector import (
     MAX_ARCS,
     SHOWN_SLIDE_EXTENT,
     ArcBudget,
     CurveTracker,
     NearbyBifurcation,
-)
-from planar.solving.continuation.run_samples import (
-    BranchRates,
-    InputRates,
-    RunSamples,
-    join_runs,
-    resting_inputs,
-    unjudged_rows,
 )
 from planar.solving.diagnosis import refusals
 from planar.solving.position import solved_mechanism, stopped_at_start
@@ -128,7 +133,7 @@ class RangeRun:
         run = self._range(steps, start, stop)
         if back:
             run = join_runs([run, run.reversed().from_row(1)._replace(passed=(), nearby=())])
-        return self._motion(run)
+        return self._motion(run, lambda: self._range_limits(run.inputs.u[:, self.index]))
 
     def _range(self, steps: int, start: float | None, stop: float | None) -> RunSamples:
         if start is None and stop is None:
@@ -171,23 +176,18 @@ class RangeRun:
             passed=tracker.passed_until(),
             nearby=tuple(tracker.nearby),
         )
-        return self._motion(run, (circuit.pieces, tracker))
 
-    def _motion(self, run: RunSamples, circuit: tuple[tuple[PathPiece, ...], CurveTracker] | None = None) -> Motion:
-        """The motion of a run, or of a circuit of pieces that were walked along."""
+        def find_limits() -> tuple[Limit, ...]:
+            search = LimitSearch(self.pair, first, 1.0, tracker)
+            return distinct_limits(self.pair, tracker.curve, search.along(circuit.pieces))
+
+        return self._motion(run, find_limits)
+
+    def _motion(self, run: RunSamples, find_limits: Callable[[], tuple[Limit, ...]]) -> Motion:
+        """The motion of a run, and what searches for its limits."""
         forks = tuple(float(passed.u[self.index]) * self.scale for passed in run.passed if passed.is_switched)
-        positions = run.inputs.u[:, self.index]
-
-        def find_limits(_: Motion) -> tuple[Limit, ...]:
-            if len(positions) < 2:
-                return ()
-            if circuit is None:
-                return self._range_limits(positions)
-            pieces, tracker = circuit
-            search = LimitSearch(self.pair, float(positions[0]), 1.0, tracker)
-            return distinct_limits(self.pair, tracker.curve, search.along(pieces))
-
-        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, None, find_limits, forks)
+        limits = find_limits if len(run.z) > 1 else tuple
+        return build_motion(self.solver, self.known.remarks, run, self.with_jerk, None, lambda _: limits(), forks)
 
     def _range_limits(self, positions: Array) -> tuple[Limit, ...]:
         """The limits between the first row and the last, from where the rows were followed from, so that the same ways

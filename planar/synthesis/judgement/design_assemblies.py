@@ -16,7 +16,7 @@ from planar.foundation.errors import NoAnswer, join_names
 from planar.foundation.jets import TURN, value_and_rates
 from planar.model.mechanism import Drive, Mechanism, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.solving.continuation.path_pieces import PathPiece
+from planar.solving.continuation.path import PathPiece
 from planar.solving.continuation.solution_curve import Arc
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.prepared_mechanism import LazyFrames
