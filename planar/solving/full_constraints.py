@@ -276,7 +276,7 @@ def mobility_by_rank(setup: PreparedMechanism, motion: EquationRates) -> tuple[i
         return len(setup.equations.unknowns) + inputs - total_rank, weak
     if motion.jacobian.shape[0] == motion.jacobian.shape[1]:
         return inputs, ()
-    # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
+    # the unknowns are determined; each independent contradiction of the inputs to the rest is a freedom less
     sizes = np.maximum(np.linalg.norm(motion.input_jacobian, axis=0), ZERO_REGULARITY)
     rates = np.linalg.lstsq(motion.jacobian, motion.input_jacobian, rcond=1e-12)[0]
     residual = (motion.input_jacobian - motion.jacobian @ rates) / sizes
@@ -390,7 +390,7 @@ def find_jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> tupl
 
 
 def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
-    """In how many ways the mechanism can move on from a position w, inputs left aside; None where it is too large."""
+    """The dimension of the motion of a mechanism on from a position w, inputs left aside; None if it is too large."""
     return motion_dimension(FullConstraints(setup), w)[0] if w.size <= MAX_COORDINATES else None
 
 

@@ -1,8 +1,8 @@
 """Positions at many inputs side by side: over a grid of several inputs, or at any positions of one, as a motion.
 
 The positions of a grid lie on the assembly to which the motion from the mechanism's own leads. From one position that
-is known lines of the grid are followed both ways, and from these the lines beside them, until no more can be reached:
-every step is followed, and none is assembled again.
+is known lines of the grid are followed in both directions, and from these the lines beside them, until no more can be
+reached: every step is followed, and none is assembled again.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Border(NamedTuple):
 
 
 class InputGrid:
-    """The nodes that are reached: unknowns `z` (..., unknowns), NaN where none is, and the borders met on the way."""
+    """The nodes that are reached: unknowns `z` (..., unknowns), NaN where none is, and the borders that are met."""
 
     def __init__(self, solver: PositionSolver, z: Array, columns: Sequence[int], axes: Sequence[Array]):
         """From unknowns z at the solver's own inputs; `columns` are the inputs that run over `axes` (scaled)."""

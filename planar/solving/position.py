@@ -82,20 +82,20 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     if fast is not None:
         return start.fast_state(fast, remarks, moved)
     target = start.with_inputs_of(moved)
-    nearby = known.nearby_positions.unknowns_at(target.inputs.u.tolist()) if target.unit == start.unit else None
-    if nearby is not None:
-        return target.state(nearby, remarks)
+    sure = known.nearby_positions.unknowns_at(target.inputs.u.tolist()) if target.unit == start.unit else None
+    if sure is not None:
+        return target.state(sure, remarks)
     from planar.solving.continuation.path import follow_straight  # most paths are surely regular
 
     # in lengths of the start's size: without a link's length a farther input makes the size greater
     u = target.inputs.u * (target.input_scale / start.input_scale)
-    path = follow_straight(start, z, start.inputs.u, u)
-    if path.passed or path.nearby:
+    z, passed, nearby = follow_straight(start, z, start.inputs.u, u)
+    if passed or nearby:
         from planar.solving.continuation.events import change_point_remarks
 
-        remarks = (*remarks, *change_point_remarks(start, path.passed, path.nearby))
+        remarks = (*remarks, *change_point_remarks(start, passed, nearby))
     unknown_scale = (start.scale / target.scale)[list(start.equations.unknowns)]
-    return target.state(path.z[-1] * unknown_scale, remarks)
+    return target.state(z * unknown_scale, remarks)
 
 
 def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
@@ -146,15 +146,14 @@ class PositionSolver(PreparedMechanism):
         return assembly
 
     def nearest(self) -> Assembly | AssemblySearchFailure:
-        """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
+        """The assembly nearest to the sketch, or where it fails; of pairs that may stay open that of least misfit.
+
+        Raises NoAnswer where the inputs leave links free, or no misfit is within that of the file.
+        """
         if any(stage.is_free for stage in self.equations.blocks):
             raise refusals.free_links(self)
-        if self.equations.open_rows:
-            return self._nearest_least_misfit()
-        return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
-
-    def _nearest_least_misfit(self) -> Assembly:
-        """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
+        if not self.equations.open_rows:
+            return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
         exact = PositionSolver(replace(self.mechanism, closes_within=None))
         assembly = least_misfit.find_least_misfit(self, exact, exact._is_regular)
         if isinstance(assembly, AssemblySearchFailure):
@@ -291,7 +290,7 @@ class PositionSolver(PreparedMechanism):
     def state_on_branch(self, z: Array, local: BranchRates) -> State:
         """The state on a change point or beside it, with the rates of the branch that was followed there.
 
-        Raises NoAnswer where the inputs do not run along the way on which it was followed.
+        Raises NoAnswer where the inputs do not run in the direction in which it was followed.
         """
         residual = self.max_residual(z, self.inputs.u)
         rates = [part[0] for part in self._sample_rates(z, {0: local})[0]]
@@ -487,7 +486,7 @@ def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:
-    """What to say of a run that did not leave its first position: if that is a change point, which ways lead on."""
+    """Why a run did not leave its first position: if that is a change point, which branches lead on."""
     if problem.outcome is Outcome.BRANCH_LOST:
         try:
             solver.state(z)

@@ -212,8 +212,12 @@ class PreparedMechanism:
         self.tolerance = float(residual_tolerance(len(mechanism.links), reach))
         "what the residual check lets pass: round-off of the residual, in lengths of the size"
         if self.equations.open_rows:
-            numbers = np.append(numbers, self._misfit_weights())
-        self.inputs = PositionInputs(*self._inputs(mechanism), numbers)
+            # the square of each misfit counts as the stiffness of its pair, beside the greatest
+            stiffness = dict(mechanism.pair_stiffness)
+            owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
+            weights = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
+            numbers = np.append(numbers, weights / weights.max())
+        self.inputs = self._position_inputs(mechanism, numbers)
 
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
@@ -223,7 +227,7 @@ class PreparedMechanism:
             return other.with_functions(self.functions) if self.is_deflated else other
         other = copy(self)
         other.mechanism = mechanism
-        other.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
+        other.inputs = self._position_inputs(mechanism, self.inputs.p)
         return other
 
     def keeps_its_numbers(self, mechanism: Mechanism) -> bool:
@@ -257,13 +261,6 @@ class PreparedMechanism:
     def stops_at(self, z: Array, u: Array) -> tuple[MetStop, ...]:
         """The stops that pairs meet at unknowns and inputs."""
         return self.stops.met_at(self.stop_positions(z, u)) if self.stops else ()
-
-    def _misfit_weights(self) -> Array:
-        """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
-        stiffness = dict(self.mechanism.pair_stiffness)
-        owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
-        weights = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
-        return weights / weights.max()
 
     def refuse_misfit(self, what: str) -> None:
         """Raise BadInput where pairs may stay open by a misfit: `what` is told of pairs that close alone."""
@@ -302,10 +299,10 @@ class PreparedMechanism:
         """Whether it has more constraints than those of its pairs and inputs."""
         return self.functions is not self.structure.functions
 
-    def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
-        """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
+    def _position_inputs(self, mechanism: Mechanism, p: Array) -> PositionInputs:
+        """The inputs of a mechanism with the numbers p of its pairs."""
         u, u1, u2 = np.array([*self.scaled_inputs(mechanism)], dtype=float).reshape(3, -1)
-        return u, u1, u2
+        return PositionInputs(u, u1, u2, p)
 
     def scaled_inputs(self, mechanism: Mechanism) -> Iterator[list[float]]:
         """Positions, velocities and accelerations of a mechanism's inputs, lengths in sizes."""

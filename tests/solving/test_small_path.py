@@ -62,7 +62,7 @@ def test_the_quick_path_tells_what_the_general_one_does(name, monkeypatch):
     quick = planar.solve(model), planar.cycle(model, 60)
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
     monkeypatch.setattr(path, "fast_run", lambda *_: None)
-    monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
+    monkeypatch.setattr("planar.solving.cycle.fast_run", lambda *_: None)
     slow = PositionSolver(model).state(PositionSolver(model).find_assembly().z), planar.cycle(model, 60)
     for one, other in zip(quick, slow, strict=True):
         assert one.remarks == other.remarks

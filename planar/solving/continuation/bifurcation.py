@@ -35,13 +35,13 @@ LEAST_VALUES = 8
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
-"""A point is on a way if it is no further from it than this part of its distance from the change point."""
+"""A point is on a branch if it is no further from it than this part of its distance from the change point."""
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
 AT_BIFURCATION_DISTANCE = 1e-5
 """So near to a singular Jacobian a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
-"""A rate of the inputs along a way below this is none."""
+"""A rate of the inputs along a branch below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4
 """Half the length of the arc that is taken as a polynomial beside a change point, and where it is given up."""
 ARC_FIT_TOLERANCE = 1e-11
@@ -62,10 +62,10 @@ MAX_REFINEMENTS, CONVERGED_STEP = 12, 1e-13
 
 
 class Bifurcation(NamedTuple):
-    """A change point with the ways through it, points at one place whose tangents are the ways: first the one that
-    leads from where the walk came.
+    """A change point with the branches through it, points at one place with the tangents of the branches: first the one
+    by which the tracker came.
 
-    `is_complete` says whether these are all; where ways touch one another, or are very many, they are not told.
+    `is_complete` says whether these are all; where branches touch one another, or are very many, some are missing.
     `rank_loss` is how much rank the Jacobian lacks.
     """
 
@@ -187,7 +187,7 @@ def _step_to_lower_rank(curve: SolutionCurve, constraints: ConstraintsAt, null_s
 
 
 class _BranchConditions:
-    """The conditions of second and third order for ways through one change point."""
+    """The conditions of second and third order for branches through one change point."""
 
     def __init__(self, curve: SolutionCurve, y: Array):
         self.curve, self.y = curve, y
@@ -197,7 +197,7 @@ class _BranchConditions:
         self.forms = curve.weighted_hessian_products(y, self.left_null, self.null) @ self.null
 
     def branch_along(self, c: Array, sideways: Array | float = 0.0) -> CurvePoint | None:
-        """The way with tangent null c and its second derivative; None where the third order leaves it open.
+        """The branch with tangent null c and its second derivative; None where the third order leaves it open.
 
         `sideways` is the second derivative of the inputs (inputs,) by how far they are on their straight line, where
         they bend off it.
@@ -220,7 +220,7 @@ class _BranchConditions:
 
 
 def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifurcation | None:
-    """A change point with the ways through it, if one of them leads from a point beside it."""
+    """A change point with the branches through it, if one of them leads from a point beside it."""
     conditions = _BranchConditions(curve, y)
     first = nearest_direction(conditions.forms, conditions.null.T @ (y - point.y))
     coming = None if first is None else conditions.branch_along(first)
@@ -233,10 +233,10 @@ def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifu
 
 
 def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
-    """The change point on which a position lies to rounding, with all ways on which the inputs move.
+    """The change point on which a position lies to rounding, with all branches on which the inputs move.
 
-    First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
-    such point.
+    First those on which the unknowns move least for the inputs, in whichever direction these go; None where the
+    position is no such point.
     """
     conditions = _conditions_at_start(curve, y)
     if conditions is None:
@@ -250,7 +250,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     ]
     if not outgoing:
         return None
-    # as the inputs' own way goes, so that both ways from here count alike
+    # in the direction of the inputs, so that both directions from here count alike
     sense = np.sign(curve.input_direction[np.argmax(np.abs(curve.input_direction))])
     rates = [tuple(np.round(sense * branch.tangent[:-1] / branch.input_rate, 6)) for branch in outgoing]
     order = sorted(range(len(outgoing)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
@@ -276,7 +276,7 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> tuple[Array, Array, Ar
     one motion through it; None if it is not one."""
     u1, u2 = setup.inputs.u1, setup.inputs.u2
     if not u1.size:
-        return None  # no input says which way
+        return None  # no input gives a direction
     speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
     # inputs that only start to move go as their accelerations say, those that stand still as the first of them
     axis = u1 if speed > 0.0 else u2 if gain > 0.0 else np.eye(u1.size)[0]
@@ -302,7 +302,7 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> tuple[Array, Array, Ar
 
 
 def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bool:
-    """Whether a way through a change point leads to a point beside it."""
+    """Whether a branch through a change point leads to a point beside it."""
     distance = float(branch.tangent @ (branch.y - point.y))
     if distance * float(branch.tangent @ point.tangent) <= 0.0:
         return False
@@ -311,7 +311,7 @@ def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bo
 
 
 def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) -> Arc | None:
-    """The arc from one side of a change point to the other along one way through it: a polynomial of eighth degree.
+    """The arc from one side of a change point to the other along one branch: a polynomial of eighth degree.
 
     Its error falls with the ninth power of its length; so far that rounding is all that is left.
     """

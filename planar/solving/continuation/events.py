@@ -15,7 +15,7 @@ from planar.foundation.root_finding import find_root_by_slope, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import count_phrase, join_all_names
 from planar.results.records import Limit
-from planar.solving.continuation.path import PathPiece, PeriodSearch, path_pieces
+from planar.solving.continuation.path import PathPiece, PeriodicPieces
 from planar.solving.continuation.predictor_corrector import (
     END_TOLERANCE,
     CurveTracker,
@@ -51,7 +51,7 @@ def watched_outputs(setup: PreparedMechanism) -> tuple[Pair, ...]:
 
 
 def _pieces_until(pieces: Iterable[PathPiece], last: float) -> Iterator[PathPiece]:
-    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it.
+    """The pieces of a curve up to a place of the inputs, or to the dead point before it.
 
     A dead point at the very place, to rounding, is not left out.
     """
@@ -74,13 +74,13 @@ class LocatedLimit(NamedTuple):
     passed: PassedBifurcation | None = None
 
     def in_direction(self, direction: float) -> LocatedLimit:
-        """The same, its point on the curve along which the input goes the other way, if that is -1."""
+        """The same, its point on the curve along which the input goes in the other direction, if that is -1."""
         y = np.append(self.point.y[:-1], direction * self.point.y[-1])
         return self._replace(point=self.point._replace(y=y))
 
 
 class LimitSearch:
-    """Looks for what a walk meets on which the input at `pair` runs from `start` in a direction, 1 or -1."""
+    """Looks for what a tracker meets while the input at `pair` runs from `start` in a direction, 1 or -1."""
 
     def __init__(self, pair: str, start: float, direction: float, tracker: CurveTracker):
         self.pair, self.start, self.direction, self.tracker = pair, start, direction, tracker
@@ -89,18 +89,17 @@ class LimitSearch:
         self.unit = self.setup.unit if self.setup.is_sliding(pair) else 1.0
 
     def until(self, last: float) -> Iterator[LocatedLimit]:
-        """What the walk meets up to a place of the input on its way.
+        """What the tracker meets up to a place of the input.
 
-        Of a walk that comes back after some turns of the input what it meets in these is reported for all.
+        Of a curve that comes back after some turns of the input what is met in these is reported for all turns.
         """
         known: list[PathPiece] = []
-        begin = self.tracker.point
-        pieces, search, period = path_pieces(self.tracker), PeriodSearch(self.tracker), None
+        begin, pieces = self.tracker.point, PeriodicPieces(self.tracker)
         for piece in pieces:
             known.append(piece)
-            period = search.period_after(piece)
-            if period is not None or piece.dead_point is not None or piece.stop > last:
+            if pieces.period is not None or piece.dead_point is not None or piece.stop > last:
                 break
+        period = pieces.period
         if period is None or last < period.length:
             yield from self.along(_pieces_until(chain(known, pieces), last), last, begin)
             return
@@ -145,7 +144,7 @@ class LimitSearch:
     def along(
         self, pieces: Iterable[PathPiece], last: float = np.inf, begin: CurvePoint | None = None
     ) -> Iterator[LocatedLimit]:
-        """What the walk meets on pieces of its curve, up to a place of the input or along a circuit; `begin` is
+        """What the tracker meets on pieces of its curve, up to a place of the input or along a circuit; `begin` is
         where they begin, if that may be a dead point."""
         curve, passed_count = self.curve, 0
         if begin is not None and begin.is_dead_point:
@@ -166,7 +165,7 @@ class LimitSearch:
                     yield self._located("stroke end", output.name, point, self._output_rates(output, point)[0])
             for passed in self.tracker.passed_until(last)[passed_count:]:
                 if not (passed.is_start or np.array_equal(passed.bifurcation.y, arc.after.y)):
-                    break  # farther on: a walk that has gone its whole way knows them all
+                    break  # farther on: a tracker that has followed all of the curve knows them all
                 remark = change_point_remark(self.setup, passed)
                 yield self._located("change point", self.pair, passed.bifurcation.branches[0], None, remark, passed)
                 passed_count += 1
@@ -216,7 +215,7 @@ class LimitSearch:
         if g0 * g1 < 0.0:
             yield find_root_by_slope(rate_and_slope, (piece.first, piece.last), (g0, g1))
         elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
-            # both ends go one way, but the output may have gone back in between
+            # both ends go in one direction, but the output may have gone back in between
             length, up = abs(piece.last - piece.first), float(np.sign(g0))
             lowest, part = lowest_on_cubic((up * g0, up * s0 * length), (up * g1, up * s1 * length))
             middle = piece.first + part * (piece.last - piece.first)
@@ -285,7 +284,7 @@ def _pin_distance(curve: SolutionCurve, point: CurvePoint, sliding: tuple[str, s
 def change_point_remarks(
     setup: PreparedMechanism, passed: Sequence[PassedBifurcation], nearby: Sequence[NearbyBifurcation]
 ) -> tuple[str, ...]:
-    """What to say of change points on the way, and near it."""
+    """What to report of change points on a path, and near it."""
     if not passed and not nearby:
         return ()
     remarks = [change_point_remark(setup, bifurcation) for bifurcation in passed]

@@ -51,14 +51,14 @@ neighbouring linkage."""
 MIN_SINGULAR_DISTANCE_RATIO = 3.0
 """How many strides the two ends of one are together from where a group could be singular; the gate asks for half."""
 STRAIGHT_TOLERANCE = 1e-12
-"""rad or sizes: inputs that are no further from a straight way are on it."""
+"""rad or sizes: inputs that are no further from a straight path are on it."""
 STEP_LENGTH = 0.125
 """rad or sizes that the fastest input moves from one kept position to the next."""
 STRIDES_AT_ONCE = 8
-"""Kept positions that are computed together, so that each depends on the way alone."""
+"""Kept positions that are computed together, so that each depends on the path alone."""
 MAX_DIRECTIONS = 8
 MAX_STORED_NUMBERS, MIN_STORED_POSITIONS = 20_000, 128
-"""Numbers that are kept of positions along one way, and positions that are kept however many numbers they have."""
+"""Numbers that are kept of positions along one path, and positions that are kept however many numbers they have."""
 
 
 class StepEnds(NamedTuple):
@@ -70,9 +70,9 @@ class StepEnds(NamedTuple):
     distances: Array
 
 
-def step_ends(functions: AcceptanceFunctions, z: Array, u: Array, way: Array, scales: Scales) -> StepEnds:
-    """What is known at positions z (steps, unknowns) and u (steps, inputs) of steps by `way` (steps, inputs)."""
-    judged = functions.judge(z, InputSamples(u, way, np.zeros_like(way)), scales)
+def step_ends(functions: AcceptanceFunctions, z: Array, u: Array, steps: Array, scales: Scales) -> StepEnds:
+    """What is known at positions z (steps, unknowns) and u (steps, inputs) of steps (steps, inputs)."""
+    judged = functions.judge(z, InputSamples(u, steps, np.zeros_like(steps)), scales)
     return StepEnds(judged.coordinate_rates[:, 1, functions.unknown_columns], judged.distances)
 
 
@@ -367,7 +367,7 @@ def _is_closed(result: AcceptanceResult[Any], tolerance: float) -> Any:
 
 
 class _KeptPosition(NamedTuple):
-    """A position that is kept: unknowns, rates of these along the way, how far along it every block is regular, and
+    """A position that is kept: unknowns, rates of these along the path, how far along it every block is regular, and
     coordinates."""
 
     z: Array
@@ -376,8 +376,8 @@ class _KeptPosition(NamedTuple):
     coordinates: Array
 
 
-class _KeptWay(NamedTuple):
-    """A straight way of the inputs: its axis, how far it goes, and how many strides lead to its last kept position."""
+class _InputPath(NamedTuple):
+    """A straight path of the inputs: its axis, how far it goes, and how many strides lead to its last kept position."""
 
     axis: tuple[float, ...]
     reach: float
@@ -394,10 +394,9 @@ def _rates_along(axis: Sequence[float], u1: list[float], u2: list[float]) -> tup
 
 
 class StraightPathCache:
-    """Positions at even distances along straight ways that lead away from one position, each made when it is needed.
+    """Positions at even distances along straight paths that lead away from one position, each made when it is needed.
 
-    They depend on that position and the way alone, so that what is found by them does not depend, but for rounding, on
-    what was asked for before.
+    They depend on that position and the path alone: results do not depend, but for rounding, on earlier requests.
     """
 
     def __init__(self, setup: PreparedMechanism, z: Array):
@@ -407,8 +406,8 @@ class StraightPathCache:
         self._step_arguments: dict[tuple[tuple[float, ...], int], list[list[float]]] = {}
 
     def unknowns_at(self, stop: Sequence[float]) -> Array | None:
-        """The unknowns to which the straight way to other inputs leads; None where not all of it is surely sound."""
-        path = self._way_to(stop)
+        """The unknowns to which the straight path to other inputs leads; None where not all of it is surely sound."""
+        path = self._path_to(stop)
         if path.reach == 0.0:
             return None if self.setup.acceptance is None or self.setup.stops is not None else self.z
         cached = self._last_kept(path)
@@ -416,15 +415,15 @@ class StraightPathCache:
         return last and last.z
 
     def position_at(self, mechanism: Mechanism) -> FastPosition | None:
-        """The position with its rates to which the straight way to the inputs of a mechanism leads, if it is surely
-        sound and they move along that way, by the formula of one step; None where that does not pay yet."""
+        """The position with its rates to which the straight path to the inputs of a mechanism leads, if it is surely
+        sound and they move along that path, by the formula of one step; None where that does not pay yet."""
         functions = self.setup.acceptance
         if functions is None or not (functions.has_one_formula and functions.has_closed_forms):
             return None
         if not self.setup.keeps_its_numbers(mechanism):
             return None
         stop, u1, u2 = self.setup.scaled_inputs(mechanism)
-        path = self._way_to(stop)
+        path = self._path_to(stop)
         place = path.last_stride * STEP_LENGTH
         along = _rates_along(path.axis, u1, u2)
         cached = self._last_kept(path) if along is not None and path.reach > place else None
@@ -448,13 +447,13 @@ class StraightPathCache:
             return None
         return FastPosition(np.array(values[RESULT_COUNT + 2 :]).reshape(ORDERS, -1), result.residual)
 
-    def _way_to(self, stop: Sequence[float]) -> _KeptWay:
+    def _path_to(self, stop: Sequence[float]) -> _InputPath:
         direction = [end - start for end, start in zip(stop, self.start, strict=True)]
         reach = max(map(abs, direction), default=0.0)
-        return _KeptWay(tuple([part / reach for part in direction]) if reach else (), reach, int(reach / STEP_LENGTH))
+        return _InputPath(tuple([part / reach for part in direction]) if reach else (), reach, int(reach / STEP_LENGTH))
 
-    def _last_kept(self, path: _KeptWay) -> _KeptPosition | None:
-        """The last kept position on a way; None where what leads there is not surely sound."""
+    def _last_kept(self, path: _InputPath) -> _KeptPosition | None:
+        """The last kept position on a path; None where what leads there is not surely sound."""
         stride = path.last_stride
         if self.setup.acceptance is None or self.setup.stops is not None or stride > self.max_positions:
             return None

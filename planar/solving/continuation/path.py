@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.root_finding import find_first_passage, find_root, lowest_on_cubic
 from planar.solving.continuation.fast_path import (
@@ -19,7 +19,6 @@ from planar.solving.continuation.fast_path import (
     InputRates,
     RunSamples,
     fast_run,
-    resting_inputs,
     unjudged_rows,
 )
 from planar.solving.continuation.predictor_corrector import (
@@ -59,8 +58,8 @@ STOP_ROUNDING = 1e-11
 
 
 class PathPiece(NamedTuple):
-    """A part of an arc on which the inputs go one way: from and to where on its axis, from and to where on the way of
-    the inputs, and the dead point at its end, if one is there."""
+    """A part of an arc on which the inputs go in one direction: the places on its axis and those of the inputs at which
+    it starts and stops, and the dead point at its end, if one is there."""
 
     arc: Arc
     first: float
@@ -86,10 +85,13 @@ class PathPiece(NamedTuple):
             y = curve.correct_beside_bifurcation(rough, arc.rank_loss, with_inputs=False)
             return y[:-1], BranchRates(derivatives_by_input(arc, x), curve.input_direction, arc.rank_loss)
         near = curve.correct(rough, input_axis(len(rough)))
+        # beyond a dead point at its end the inputs come to the same positions once more
+        low, high = sorted((self.first, self.last))
+        slack = STRAIGHT_TOLERANCE * (high - low)
         if (
             near is None
             or np.linalg.norm(near - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
-            or not self._holds(near)
+            or not low - slack <= arc.place(near) <= high + slack
             or not curve.is_closed(near)
         ):
             near = arc.curve_coordinates(
@@ -97,23 +99,16 @@ class PathPiece(NamedTuple):
             )
         return near[:-1], None
 
-    def _holds(self, y: Array) -> bool:
-        """Whether a point of the curve lies on this piece, and not beyond a dead point at its end, where the inputs
-        come to the same places once more."""
-        x, (low, high) = self.arc.place(y), sorted((self.first, self.last))
-        slack = STRAIGHT_TOLERANCE * (high - low)
-        return low - slack <= x <= high + slack
-
 
 def piece_at(pieces: Sequence[PathPiece], position: float) -> PathPiece:
-    """The piece on which the inputs are at a place, of pieces on which they go one way."""
+    """The piece on which the inputs are at a place, of pieces on which they go in one direction."""
     sense = 1.0 if pieces[-1].stop >= pieces[0].start else -1.0
     index = bisect_left(pieces, sense * position, key=lambda piece: sense * piece.stop)
     return pieces[min(index, len(pieces) - 1)]
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
-    """A walk's arcs, parted at dead points, up to the first stop that a pair meets."""
+    """The arcs of a curve, parted at dead points, up to the first stop that a pair meets."""
     curve, stops = tracker.curve, tracker.curve.solver.stops
     if stops is None:
         yield from _pieces_by_dead_points(tracker)
@@ -133,7 +128,7 @@ def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
 
 
 def _pieces_by_dead_points(tracker: CurveTracker) -> Iterator[PathPiece]:
-    """A walk's arcs, parted at dead points."""
+    """The arcs of a curve, parted at dead points."""
     curve = tracker.curve
     if tracker.point.is_dead_point and tracker.point.curvature[-1] < 0.0:
         point = tracker.point
@@ -274,22 +269,30 @@ class Period(NamedTuple):
                     yield passed._replace(u=passed.u + times * self.length * passed.input_direction)
 
 
-class PeriodSearch:
-    """Looks whether a walk on which one input turns comes back, as it goes on smoothly through change points."""
+class PeriodicPieces:
+    """The pieces of a curve one after the other, and its period once these have come back to the start.
 
-    def __init__(self, walk: CurveTracker):
-        self.tracker, self.start = walk, walk.point
-        self._pieces: list[PathPiece] | None = []
-        if not walk.is_periodic[-1] or np.count_nonzero(walk.curve.input_direction) > 1 or walk.branches:
-            self._pieces = None
+    Periods are looked for where one input turns, and the curve goes on smoothly through change points.
+    """
 
-    def period_after(self, piece: PathPiece) -> Period | None:
-        """The period, if the next piece of the walk is its last."""
-        if self._pieces is None:
-            return None
-        if piece.dead_point is not None or len(self._pieces) >= MAX_PIECES:
-            self._pieces = None
-            return None
+    def __init__(self, tracker: CurveTracker):
+        self.tracker, self.start = tracker, tracker.point
+        self.period: Period | None = None
+        self._following, self._pieces = path_pieces(tracker), list[PathPiece]()
+        turns_alone = tracker.is_periodic[-1] and np.count_nonzero(tracker.curve.input_direction) <= 1
+        self._may_close = turns_alone and not tracker.branches
+
+    def __iter__(self) -> Iterator[PathPiece]:
+        return self
+
+    def __next__(self) -> PathPiece:
+        piece = next(self._following)
+        self._may_close &= piece.dead_point is None and len(self._pieces) < MAX_PIECES
+        self.period = self._period_until(piece) if self._may_close else None
+        return piece
+
+    def _period_until(self, piece: PathPiece) -> Period | None:
+        """The period, if this next piece is its last."""
         self._pieces.append(piece)
         closing = closing_piece(self.tracker, piece, self.start)
         if closing is None or not closing[0].stop > ROUNDING_TOLERANCE:
@@ -302,7 +305,7 @@ class PeriodSearch:
         return period if self._is_closed(period) else None
 
     def _is_closed(self, period: Period) -> bool:
-        """Whether all of it, not its start alone, is closed whole turns on: where angles count turns it need not be."""
+        """Whether all of it, not its start alone, is closed full turns on: where angles count turns it need not be."""
         solver = self.tracker.curve.solver
         pieces = period.pieces[:: max(1, len(period.pieces) // MAX_CHECKED_PIECES)]
         y = np.array([piece.arc.before.y for piece in pieces if not piece.arc.is_exact]) + period.growth
@@ -349,7 +352,7 @@ class ClosedCircuit(NamedTuple):
 
 
 def split_at_dead_points(pieces: Iterable[PathPiece]) -> tuple[tuple[PathPiece, ...], ...]:
-    """The pieces of a curve in their order, by branch: the input goes one way on each."""
+    """The pieces of a curve in their order, by branch: the input goes in one direction on each."""
     branches: list[list[PathPiece]] = [[]]
     for piece in pieces:
         branches[-1].append(piece)
@@ -369,7 +372,7 @@ def is_endless(tracker: CurveTracker, piece: PathPiece) -> bool:
 
 
 def follow_circuit(tracker: CurveTracker) -> ClosedCircuit:
-    """The circuit from where a walk stands. Raises NoAnswer where it is not found to close."""
+    """The circuit from where a tracker stands. Raises NoAnswer where it is not found to close."""
     start = tracker.point
     pieces: list[PathPiece] = []
     for piece in moving_pieces(tracker):
@@ -393,8 +396,7 @@ def follow_circuit(tracker: CurveTracker) -> ClosedCircuit:
 
 
 class PathFollower:
-    """Goes along a straight path of the inputs to its first dead point, and tells the unknowns at places in their
-    order.
+    """Follows a straight path of the inputs to its first dead point, and returns the unknowns at places in their order.
 
     The path is one on which the fastest input goes one rad or size a unit.
     """
@@ -408,16 +410,15 @@ class PathFollower:
         branches: Sequence[int] = (),
         budget: ArcBudget | None = None,
     ):
-        speed = float(np.max(np.abs(direction), initial=0.0)) or 1.0
+        speed = greatest_size(direction) or 1.0
         self.tracker = CurveTracker(solver, z, start, direction / speed, branches, budget)
-        self._pieces, self._period_search = path_pieces(self.tracker), PeriodSearch(self.tracker)
+        self._pieces = PeriodicPieces(self.tracker)
         self._piece: PathPiece | None = None
-        self._period: Period | None = None
         self._reached = 0.0
 
     def has_position(self, position: float) -> bool:
         """Whether a place lies on what has been followed already."""
-        return self._piece is not None and (position <= self._piece.stop or self._period is not None)
+        return self._piece is not None and (position <= self._piece.stop or self._pieces.period is not None)
 
     @property
     def last_position(self) -> tuple[Array, Array] | None:
@@ -444,36 +445,40 @@ class PathFollower:
                     tracker.limit, tracker.ending = None, TrackingEnd.OUT_OF_RANGE
                 return None
             piece = self._piece = following
-            self._period = self._period_search.period_after(piece)
             if piece.dead_point is not None:
                 tracker.point, tracker.ending = piece.dead_point, TrackingEnd.DEAD_POINT
         self._reached = position
-        if self._period is not None and position > piece.stop:
-            return self._period.unknowns_at(tracker.curve, position)
+        if self._pieces.period is not None and position > piece.stop:
+            return self._pieces.period.unknowns_at(tracker.curve, position)
         return piece.unknowns_at(tracker.curve, position)
 
     def bifurcations_until(self, last: float) -> tuple[PassedBifurcation, ...]:
         """The change points passed up to a place that it has come to."""
-        return self.tracker.passed_until(last) if self._period is None else (*self._period.bifurcations_until(last),)
+        period = self._pieces.period
+        return self.tracker.passed_until(last) if period is None else (*period.bifurcations_until(last),)
 
 
 def follow_to(solver: PreparedMechanism, z: Array, start: Array, stop: Array) -> Array:
     """The unknowns at inputs `stop`; see `follow_straight`."""
-    return follow_straight(solver, z, start, stop).z[-1]
+    return follow_straight(solver, z, start, stop)[0]
 
 
-def follow_straight(solver: PreparedMechanism, z: Array, start: Array, stop: Array) -> RunSamples:
-    """The unknowns at inputs `start` and `stop`, followed along the straight line between them.
+def follow_straight(
+    solver: PreparedMechanism, z: Array, start: Array, stop: Array
+) -> tuple[Array, tuple[PassedBifurcation, ...], list[NearbyBifurcation]]:
+    """The unknowns at inputs `stop`, followed along the straight line from unknowns z at inputs `start`; the change
+    points that are passed, and those of neighbouring linkages.
 
     Smoothly through change points. Raises NoAnswer where a dead point is on the way, or the branch cannot be followed.
     """
-    inputs = resting_inputs(np.stack([start, stop]))
-    if np.array_equal(start, stop):
-        return unjudged_rows(solver, np.stack([z, z]), inputs)
-    run = _SamplesFollower(solver, z, inputs).follow(is_quick=False)
-    if run.stopped is not None:
-        raise run.stopped
-    return run
+    distance = greatest_size(stop - start)
+    if distance == 0.0:
+        return z, (), []
+    follower = PathFollower(solver, z, start, stop - start)
+    position = follower.unknowns_at(distance)
+    if position is None:
+        raise follower.tracker.end_refusal()
+    return position[0], follower.bifurcations_until(distance), follower.tracker.nearby
 
 
 def follow_samples(
@@ -485,7 +490,7 @@ def follow_samples(
 ) -> RunSamples:
     """A run of inputs, from the unknowns of its first sample as far as the motion comes.
 
-    The whole run is computed block after block, each at all samples; every sample then passes both checks, and from
+    The run is computed block after block, each at all samples; every sample then passes both checks, and from
     one that does not the general path goes on until the quick one can take over again. What the general path does is
     counted in `budget`.
     """
@@ -516,14 +521,13 @@ class _SamplesFollower:
         "those of the next samples on the follower's path, each with the one after it"
         self._passed_before = 0
 
-    def follow(self, is_quick: bool = True) -> RunSamples:
-        """All samples, as far as the motion comes; by the general path alone where `is_quick` is not set."""
+    def follow(self) -> RunSamples:
+        """All samples, as far as the motion comes."""
         samples = window = len(self.u)
         done, stopped = 1, None
         while done < samples and stopped is None:
             first, last = done, min(done + window, samples)
-            if is_quick:
-                done = self._follow_quickly(slice(done - 1, last))
+            done = self._follow_quickly(slice(done - 1, last))
             # of what comes after a sample that did not pass no more is tried than has passed before
             window = max(MIN_WINDOW, 2 * (done - first))
             if done > first:
@@ -583,8 +587,10 @@ class _SamplesFollower:
         if self.follower is not None:
             self.nearby += self.follower.tracker.nearby
         base = done - 1
-        while base and base in self.branch_rates and self._turns_back(base, done):
-            base -= 1  # what turns back on a change point comes back by the branch on which it came
+        # what turns back on a change point comes back by the branch on which it came
+        move = self.u[done] - self.u[done - 1]
+        while base and base in self.branch_rates and move @ self.branch_rates[base].input_direction < 0.0:
+            base -= 1
         ahead = np.vstack([self.u[base], self.u[done : done + MAX_SAMPLES_AHEAD]])
         direction, places = _straight_places(ahead)
         branches = self.branches[len(self.passed) :] if direction.any() else ()
@@ -597,10 +603,6 @@ class _SamplesFollower:
             assert rates is not None
             self.z[base], self.branch_rates[base] = z, rates
         return follower, next(self._places)
-
-    def _turns_back(self, base: int, done: int) -> bool:
-        """Whether the inputs go back after a sample on a change point."""
-        return bool((self.u[done] - self.u[done - 1]) @ self.branch_rates[base].input_direction < 0.0)
 
 
 def _straight_places(u: Array) -> tuple[Array, list[float]]:

@@ -46,7 +46,7 @@ SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
 MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than this multiple of the distance within which there is none is another one."""
 MAX_ARCS = 5_000
-"""Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
+"""Arcs that are followed for one answer; a turn of a usual linkage has some fifty."""
 NEAR_SLIDE_EXTENT = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
 MAX_TURNING_EXTENT = 1e5
@@ -55,7 +55,7 @@ SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
 MAX_SLIDE_EXTENT = 6e6
-"""Lengths of the size: farther out than this the residual check tells nothing."""
+"""Lengths of the size: farther out than this the residual check decides nothing."""
 MIN_LIMIT_POWER = 0.25
 """Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
 the square root, which is the lowest that lines becoming parallel give, they do."""
@@ -68,8 +68,8 @@ Lengths: TypeAlias = Any
 
 
 class PassedBifurcation(NamedTuple):
-    """A change point that a walk went through, at inputs u along a direction of them: the ways, by the first of which
-    it came, and by which it went on; or on which it started."""
+    """A change point that a tracker passed, at inputs u along a direction of them, or on which it started; and the
+    index of the branch by which it went on. By the first it came."""
 
     bifurcation: Bifurcation
     branch_index: int
@@ -77,17 +77,17 @@ class PassedBifurcation(NamedTuple):
     input_direction: Array
     is_start: bool = False
     beyond: bool = False
-    """Whether a higher number was asked for than there are ways, so that it took the last."""
+    """Whether a higher number was asked for than there are branches, so that it took the last."""
 
     @property
     def is_switched(self) -> bool:
-        """Whether it went on by another way than smoothly."""
+        """Whether it went on by another branch than the smooth one."""
         return self.branch_index != 0 and not self.is_start
 
 
 class NearbyBifurcation(NamedTuple):
-    """A change point of a neighbouring linkage that a walk came near: where, how near, and by how much this linkage's
-    constraints do not close there (lengths of the size)."""
+    """A change point of a neighbouring linkage that a tracker came near: where, how near, and by how much this linkage
+    does not close there (lengths of the size)."""
 
     y: Array
     distance: float
@@ -97,8 +97,8 @@ class NearbyBifurcation(NamedTuple):
 class ArcBudget:
     """What may be spent on one answer, counted in arcs, each of which is reported with the inputs there."""
 
-    def __init__(self, arcs: int = MAX_ARCS, tell: Callable[[Array], None] | None = None):
-        self.arcs_left, self._report = arcs, tell
+    def __init__(self, arcs: int = MAX_ARCS, report: Callable[[Array], None] | None = None):
+        self.arcs_left, self._report = arcs, report
 
     def spend(self, u: Array) -> bool:
         """Count an arc from inputs u (inputs,); False where nothing is left to spend, or the time is over."""
@@ -150,11 +150,11 @@ class _EndReporter(Protocol):
 
 
 class CurveTracker:
-    """One walk along a curve from a position: its arcs, one after the other, and what it met on the way.
+    """Follows a curve from a position: its arcs, one after the other, and the change points that are met.
 
-    `branches` are the numbers of the ways taken at change points, in the order in which they are met: 1 goes on
-    smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends. On a start on a change point they
-    number the ways through it, on one on a dead point its two ways.
+    `branches` are the numbers of the branches taken at change points, in the order in which these are met: 1 goes on
+    smoothly, 2 takes the branch nearest to that, and so on; 1 where the list ends. On a start on a change point they
+    number the branches through it, on one on a dead point its two branches.
     """
 
     def __init__(
@@ -266,7 +266,7 @@ class CurveTracker:
 
     @property
     def starts_on_bifurcation(self) -> bool:
-        """Whether it starts on a change point, by a way that was asked for."""
+        """Whether it starts on a change point, by a branch that was asked for."""
         return self._start_arc is not None
 
     def _note_passed(self, bifurcation: Bifurcation, index: int, is_start: bool, beyond: bool) -> None:
@@ -274,7 +274,7 @@ class CurveTracker:
         self.passed.append(PassedBifurcation(bifurcation, index, u, direction, is_start, beyond))
 
     def passed_until(self, last: float = np.inf) -> tuple[PassedBifurcation, ...]:
-        """The change points passed up to a place of the inputs on their way."""
+        """The change points passed up to a place of the inputs on their path."""
         return tuple(passed for passed in self.passed if passed.bifurcation.y[-1] <= last + END_TOLERANCE)
 
     @property
@@ -346,7 +346,7 @@ class CurveTracker:
 def _input_limit(point: CurvePoint, slide: int) -> float | None:
     """The place to which the inputs tend as a slide goes out without an end; None where they go on with it.
 
-    Far out t = limit + c s^-k, of which the first and second derivative by s tell k and the rest of the way.
+    Far out t = limit + c s^-k, where k and the rest of the path follow from the first and second derivative by s.
     """
     s, s1, s2 = point.y[slide], point.tangent[slide], point.curvature[slide]
     t, t1, t2 = point.y[-1], point.tangent[-1], point.curvature[-1]
@@ -360,9 +360,9 @@ def _input_limit(point: CurvePoint, slide: int) -> float | None:
 
 
 def outgoing_branches(bifurcation: Bifurcation, point: CurvePoint) -> list[tuple[int, CurvePoint]]:
-    """The ways on from a change point with their numbers: the smooth one first, then by the angle from it.
+    """The branches on from a change point with their numbers: the smooth one first, then by the angle from it.
 
-    Of another way the direction in which the inputs go on as they came; both where they rest on it.
+    Of another branch the direction in which the inputs go on as they came; both where they rest on it.
     """
     smooth = bifurcation.branches[0].towards(point.tangent)
     options = [(0, smooth)]

@@ -226,7 +226,7 @@ def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
 
 
 def change_point(setup: PreparedMechanism, links: Sequence[str], freedoms: int, z: Array) -> NoAnswer:
-    """A position from which the mechanism may go on in several ways, and how one is chosen."""
+    """A position from which the mechanism may go on by several branches, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
         f"{setup.describe_position()} the mechanism has {count_phrase(freedoms, 'freedom')} for "
@@ -237,7 +237,7 @@ def change_point(setup: PreparedMechanism, links: Sequence[str], freedoms: int, 
 
 
 def _branch_choices(setup: PreparedMechanism, z: Array) -> str:
-    """By which number a cycle goes on along which way, told by the link that moves most differently on them."""
+    """By which number a cycle goes on along which branch, described by the link that moves most differently on them."""
     if len(setup.mechanism.inputs) != 1 or not setup.has_extent:
         return ""
     from planar.solving.continuation.bifurcation import bifurcation_at_start
@@ -277,41 +277,24 @@ def motion_ended(setup: PreparedMechanism, rates: Sequence[Array], where: str, e
     """Where motions of the inputs end: a dead point, the infinite, or branches that cannot be told apart; each with the
     rates of its unknowns there (unknowns,)."""
     links = list(dict.fromkeys(link for of_motion in rates for link in full_constraints.moved_links(setup, of_motion)))
-    drive, outcome = _offered_pairs(setup, links, 4), Outcome.BRANCH_LOST
-    if ending is TrackingEnd.DEAD_POINT:
-        outcome = Outcome.DEAD_POINT
-        sentence = (
-            f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
-            f"stay short of it, go through the whole circuit, or drive {drive}"
-        )
-    elif ending is TrackingEnd.ENDLESS:
-        sentence = (
-            f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
-            f"where lines become parallel; stop short of it, or drive {drive}"
-        )
-    elif ending is TrackingEnd.OUT_OF_RANGE:
-        sentence = (
-            f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
-            f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
-            "file"
-        )
-    elif ending is TrackingEnd.INTERRUPTED:
-        outcome = Outcome.INTERRUPTED
-        sentence = (
-            f"this assembly was followed as far as {where}, when {time_is_over()}; go on from there, or give more time"
-        )
-    elif ending is TrackingEnd.WORK_LIMIT:
-        sentence = (
-            f"this assembly was followed as far as {where}, which took all the work that one answer may; stop there "
-            f"and go on from there, divide the range into more steps, or drive {drive}"
-        )
-    else:
-        motions = f"motions of {_links(links)} meet" if links else "motions meet"
-        sentence = (
-            f"this assembly can be followed only to {where}: there {motions} that cannot be told apart; stop short of "
-            f"it, or drive {drive}"
-        )
-    return NoAnswer(outcome, sentence)
+    drive, moved = _offered_pairs(setup, links, 4), _links(links)
+    beyond = f"{_inputs(setup)} cannot go beyond {where}"
+    only, until = f"this assembly can be followed only to {where}", f"this assembly was followed as far as {where}"
+    motions = f"motions of {moved} meet" if links else "motions meet"
+    sentences = {
+        TrackingEnd.DEAD_POINT: f"{beyond}, a dead point: {moved} would lead back from there; stay short of it, "
+        f"go through the whole circuit, or drive {drive}",
+        TrackingEnd.ENDLESS: f"{beyond}: towards there {moved} slide out without an end, as where lines become "
+        f"parallel; stop short of it, or drive {drive}",
+        TrackingEnd.OUT_OF_RANGE: f"{only}: there {moved} are out by millions of times the mechanism's size; stop "
+        "short of it, or write the place that is wanted as the input's `position` in the file",
+        TrackingEnd.INTERRUPTED: f"{until}, when {time_is_over()}; go on from there, or give more time",
+        TrackingEnd.WORK_LIMIT: f"{until}, which took all the work that one answer may; stop there and go on from "
+        f"there, divide the range into more steps, or drive {drive}",
+    }
+    lost = f"{only}: there {motions} that cannot be told apart; stop short of it, or drive {drive}"
+    outcomes = {TrackingEnd.DEAD_POINT: Outcome.DEAD_POINT, TrackingEnd.INTERRUPTED: Outcome.INTERRUPTED}
+    return NoAnswer(outcomes.get(ending, Outcome.BRANCH_LOST), sentences.get(ending, lost))
 
 
 def motion_stopped(setup: PreparedMechanism, met: str, where: str) -> NoAnswer:

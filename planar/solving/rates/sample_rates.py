@@ -21,7 +21,7 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
 DIRECTION_TOLERANCE = 1e-9
-"""A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
+"""A part of the inputs' rates that is this much aside of the direction in which a change point was passed is none."""
 SMALLEST_NORMAL = float(np.finfo(float).tiny)
 MAX_ACCELERATION_ERROR = 0.1
 """Part of an acceleration that may be wrong."""
@@ -78,7 +78,7 @@ def sample_rates(
 
 
 def _rates_in_time(branch_rates: BranchRates, inputs: InputRates, index: int) -> Array | None:
-    """Rates in time (3, unknowns) from those along a way; None where the inputs do not run along it."""
+    """Rates in time (3, unknowns) from those along a direction; None where the inputs do not run along it."""
     direction, size = branch_rates.input_direction, float(branch_rates.input_direction @ branch_rates.input_direction)
     along = []
     for rate in (inputs.u1[index], inputs.u2[index], inputs.u3[index]):

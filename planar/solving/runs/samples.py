@@ -118,7 +118,7 @@ def _rows_within_misfit(solver: PositionSolver, run: RunSamples) -> RunSamples:
 
 
 def _rates_at_dead_points(solver: PositionSolver, run: RunSamples) -> CheckedRates | None:
-    """Rows that are all dead points, which have no rates, by the acceptance test; None where it does not tell."""
+    """Rows that are all dead points, which have no rates, by the acceptance test; None where it does not decide."""
     if solver.acceptance is None or len(run.dead_points) < len(run.z):
         return None
     w: Array = np.full((3, len(run.z), len(solver.scale)), np.nan)
@@ -170,7 +170,7 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool, is_
 
 
 def _undetermined_remark(solver: PositionSolver, run: RunSamples, w1: Array) -> tuple[str, ...]:
-    """What is said of the first row without rates that is no dead point: what would be said of it by itself."""
+    """Why the first row without rates that is no dead point has none, as `solve` would say of that position."""
     missing = np.setdiff1d(np.flatnonzero(np.isnan(w1).any(axis=1)), run.dead_points)
     if not missing.size:
         return ()
@@ -233,7 +233,7 @@ class ContinuousRun:
         singular = [] if course is None else [row for row in course.singular_rows if row < len(motion)]
         has_rates = rows_with_rates(motion)
         self.is_regular = bool(has_rates.all()) and self.high > self.low
-        "whether every row has rates, so that no dead point or unsolved row is on the way"
+        "whether every row has rates, so that no dead point or unsolved row is between"
         self._is_sound: BoolArray = has_rates.copy()
         self._is_sound[singular] = False
         forks = () if course is None or motion.time is not None else course.fork_positions
