@@ -12,8 +12,8 @@ from benchmarks.swept.base import Swept
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
+from planar.solving.continuation.fast_path import resting_inputs
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
 
 SYSTEM = "planar.sweep"

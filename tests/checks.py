@@ -10,7 +10,7 @@ import planar
 from planar.dynamics.forces import Forces
 from planar.equations.acceptance import AcceptanceFunctions, Scales
 from planar.foundation.arrays import Array, BoolArray
-from planar.solving.checks import branch_check
+from planar.solving.continuation import fast_path
 from planar.solving.position import PositionSolver
 from tests.builders import Value
 
@@ -38,8 +38,6 @@ def accept_steps(functions: AcceptanceFunctions, z: Array, u: Array, scales: Sca
     """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to its branch."""
     way = np.diff(u, axis=0)
     before, after = (
-        branch_check.step_ends(functions, z[part], u[part], way, scales) for part in (slice(-1), slice(1, None))
+        fast_path.step_ends(functions, z[part], u[part], way, scales) for part in (slice(-1), slice(1, None))
     )
-    return branch_check.keep_branch(
-        np.diff(z, axis=0), before, after, np.sum(way * way, axis=1), functions.block_starts
-    )
+    return fast_path.keep_branch(np.diff(z, axis=0), before, after, np.sum(way * way, axis=1), functions.block_starts)

@@ -18,7 +18,6 @@ from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
-from planar.solving.rates.regularity import regularity
 
 LIFTING = ("cam", "geneva")
 """Pairs whose formulas are put together of pieces, of which a search from starts in a loop may miss solutions: these
@@ -247,7 +246,7 @@ def conditioning(solver: PositionSolver, z: np.ndarray) -> float:
     """The least singular value of any group at a position, as the solver judges it."""
     y = np.concatenate([z, solver.inputs.u])
     slope = solver.functions.kinematics(y, 0.0 * y, 0.0 * y, solver.inputs.p).jacobian
-    return float(regularity(solver, slope).min(initial=1.0))
+    return float(solver.jacobian_regularity(slope).min(initial=1.0))
 
 
 def determinate(mechanism: Mechanism, built: Built) -> bool:

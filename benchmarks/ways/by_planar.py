@@ -12,8 +12,8 @@ from benchmarks.ways.trial import CRANK, Array, Trial
 from planar.equations.acceptance import InputSamples
 from planar.model.mechanism import Drive, replace_inputs
 from planar.results.motion import Motion, State
+from planar.solving.continuation.fast_path import resting_inputs
 from planar.solving.continuation.path import follow_samples, follow_to
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver, solve
 
 

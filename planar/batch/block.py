@@ -22,7 +22,7 @@ from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
-from planar.solving.runs.continuous_run import input_law_rates
+from planar.solving.runs.samples import input_law_rates
 
 Array = np.ndarray
 

@@ -29,7 +29,7 @@ CYCLE_PARTS: dict[FunctionKey, str] = {
     ("equations", "acceptance.py", "_judge_by_one_formula"): "rates and the residual check",
     ("equations", "constraint_check.py", "judge"): "the residual check",
     ("continuation", "path.py", "_follow_general"): "following the curve",
-    ("runs", "range_run.py", "_find_range_end"): "finding the ends of the range",
+    ("solving", "cycle.py", "_find_range_end"): "finding the ends of the range",
 }
 """The same of a cycle."""
 

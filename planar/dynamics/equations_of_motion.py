@@ -31,7 +31,7 @@ from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices,
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
-from planar.solving.runs.continuous_run import input_law_rates
+from planar.solving.runs.samples import input_law_rates
 from planar.solving.stops import MetStop
 
 RANK_TOLERANCE = 1e-9

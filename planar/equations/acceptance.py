@@ -51,7 +51,7 @@ class AcceptanceResult(NamedTuple, Generic[Judged]):
     contact_gap: Judged
     "the greatest gap, or rate of one as a part of the greatest, of contacts that guides have to keep closed"
     regularity: Judged
-    "no more than the least regularity of any block, see `solving.rates.regularity`"
+    "no more than the least regularity of any block, see `PreparedMechanism.jacobian_regularity`"
     least_singular_value: Judged
     "no more than the least singular value of any block, columns of one size"
     rounding_amplification: Judged
@@ -71,7 +71,7 @@ class InputSamples(NamedTuple):
 
 class Scales(NamedTuple):
     """The numbers p of a mechanism, what every row is divided by (rows,), and the least sizes of columns (unknowns,):
-    see `solving.rates.regularity`."""
+    see `PreparedMechanism.jacobian_regularity`."""
 
     p: Array
     row_scale: Array

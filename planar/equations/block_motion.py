@@ -30,9 +30,9 @@ DIFFERENCE_STEP = 1e-6
 def derive_block_motion(e: ConstraintEquations) -> RecordedFormula:
     """The formula of equations that are one block, of which u are the coordinates that are known ahead.
 
-    (z, u, u1, u2, p, row scale, column floor) -> w, w1, w2, F, then the regularity (`solving.rates.regularity`) and the
-    least singular value, no more than they are, by how much round-off is greater in the rates, and how far in such
-    steps as u1 the block is regular, with the sign of its determinant.
+    (z, u, u1, u2, p, row scale, column floor) -> w, w1, w2, F, then the regularity (see
+    `PreparedMechanism.jacobian_regularity`) and the least singular value, no more than they are, by how much round-off
+    is greater in the rates, and how far in such steps as u1 the block is regular, with the sign of its determinant.
     """
     from planar.equations.generic_evaluation import recorded_function
     from planar.equations.rates import UnknownRates, first_and_second_rates
@@ -58,7 +58,7 @@ def derive_block_motion(e: ConstraintEquations) -> RecordedFormula:
 
 
 def regularity_bound(block: ca.SX, row_scale: ca.SX, column_floor: ca.SX) -> ca.SX:
-    """No more than the regularity of a block, see `solving.rates.regularity`."""
+    """No more than the regularity of a block, see `PreparedMechanism.jacobian_regularity`."""
     scaled = block / ca.repmat(row_scale, 1, block.size2())
     sizes = [ca.fmax(ca.norm_2(scaled[:, k]), column_floor[k]) for k in range(block.size2())]
     low, high, _ = _singular_value_bounds(scaled / ca.repmat(ca.horzcat(*sizes), block.size1(), 1))
@@ -127,7 +127,7 @@ def reduce_to_triangle(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 def regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
     """No more than the least singular value of a block, columns of one size, and how far along a direction it is one at
-    least (Weyl), see `solving.checks.branch_check`.
+    least (Weyl), see `solving.continuation.fast_path`.
 
     The distance has the sign of the block's determinant: on one branch it stays the same, and of two assemblies that a
     dead point brings together one has the other.

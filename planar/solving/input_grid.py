@@ -1,8 +1,8 @@
 """Positions at many inputs side by side: over a grid of several inputs, or at any positions of one, as a motion.
 
 The positions of a grid lie on the assembly to which the motion from the mechanism's own leads. From one position that
-is known lines of the grid are followed both ways, and from these the lines beside them, until no more can be reached:
-every step is followed, and none is assembled again.
+is known lines of the grid are followed in both directions, and from these the lines beside them, until no more can be
+reached: every step is followed, and none is assembled again.
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.checks.singular_values import MIN_REGULARITY
+from planar.solving.continuation.fast_path import InputRates, resting_inputs, unjudged_rows
 from planar.solving.continuation.path import follow_samples, follow_to
-from planar.solving.continuation.run_samples import InputRates, resting_inputs, unjudged_rows
 from planar.solving.position import PositionSolver, solved_mechanism
-from planar.solving.rates.regularity import regularity
 from planar.solving.runs.samples import build_motion
 
 MAX_STARTS = 16
@@ -43,7 +42,7 @@ class Border(NamedTuple):
 
 
 class InputGrid:
-    """The nodes that are reached: unknowns `z` (..., unknowns), NaN where none is, and the borders met on the way."""
+    """The nodes that are reached: unknowns `z` (..., unknowns), NaN where none is, and the borders that are met."""
 
     def __init__(self, solver: PositionSolver, z: Array, columns: Sequence[int], axes: Sequence[Array]):
         """From unknowns z at the solver's own inputs; `columns` are the inputs that run over `axes` (scaled)."""
@@ -110,21 +109,18 @@ class InputGrid:
         u = np.array([self.inputs_at(node) for node in nodes])
         run = follow_samples(self.solver, self.z[nodes[0]], resting_inputs(u))
         jacobians, _ = self.solver.functions.jacobians(run.z, run.inputs.u, self.solver.inputs.p)
-        weak = np.flatnonzero(regularity(self.solver, jacobians).min(axis=-1, initial=1.0) < MIN_REGULARITY)
+        weak = np.flatnonzero(self.solver.jacobian_regularity(jacobians).min(axis=-1, initial=1.0) < MIN_REGULARITY)
+        problem, end = run.stopped, None if run.last_position is None else run.last_position[1]
+        count = len(run.z)
         if weak.size and weak[0]:
-            row = int(weak[0])
-            reason = f"a dead point is at {self.solver.describe_inputs(u[row])}"
-            self._note_border(nodes[row - 1], nodes[row], NoAnswer(Outcome.DEAD_POINT, reason), u[row])
-            run = run.select(np.arange(row))._replace(stopped=None)
-        for node, z in zip(nodes[1:], run.z[1:], strict=False):
+            count = int(weak[0])
+            end = u[count]
+            problem = NoAnswer(Outcome.DEAD_POINT, f"a dead point is at {self.solver.describe_inputs(end)}")
+        for node, z in zip(nodes[1:count], run.z[1:count], strict=True):
             self._enter(node, z)
-        if run.stopped is not None:
-            last = len(run.z) - 1
-            end = None if run.last_position is None else run.last_position[1]
-            self._note_border(nodes[last], nodes[last + 1], run.stopped, end)
-
-    def _note_border(self, node: Node, beyond: Node, problem: NoAnswer, u: Array | None) -> None:
-        self.borders[node, beyond] = Border(node, beyond, problem.outcome, problem.reason, u)
+        if problem is not None:
+            border = nodes[count - 1], nodes[count]
+            self.borders[border] = Border(*border, problem.outcome, problem.reason, end)
 
     def outcomes(self) -> IntArray:
         """Why each node is not reached (...), as the index of an `Outcome`; that of the border that lies before it."""

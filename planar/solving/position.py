@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
+from planar.equations.acceptance import InputSamples
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
 from planar.equations.symbolic_equations import slice_length
@@ -25,27 +26,25 @@ from planar.solving.checks.residual_check import stack_motion
 from planar.solving.checks.singular_values import MIN_REGULARITY, null_space
 from planar.solving.continuation.fast_path import (
     MIN_FAST_REGULARITY,
+    BranchRates,
     FastPosition,
+    InputRates,
     StraightPathCache,
     fast_position,
-    is_surely_regular,
 )
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
+    from planar.solving import full_constraints
     from planar.solving.assembly import least_misfit
-    from planar.solving.continuation import run_samples
-    from planar.solving.continuation.run_samples import BranchRates
     from planar.solving.continuation.solution_curve import CurvePoint
-    from planar.solving.diagnosis import judgement, refusals
-    from planar.solving.rates import regularity, sample_rates
+    from planar.solving.diagnosis import refusals
+    from planar.solving.rates import sample_rates
 else:  # few positions need them
     least_misfit = LazyModule("planar.solving.assembly.least_misfit")
-    judgement = LazyModule("planar.solving.diagnosis.judgement")
-    run_samples = LazyModule("planar.solving.continuation.run_samples")
+    full_constraints = LazyModule("planar.solving.full_constraints")
     refusals = LazyModule("planar.solving.diagnosis.refusals")
-    regularity = LazyModule("planar.solving.rates.regularity")
     sample_rates = LazyModule("planar.solving.rates.sample_rates")
 
 
@@ -83,20 +82,20 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     if fast is not None:
         return start.fast_state(fast, remarks, moved)
     target = start.with_inputs_of(moved)
-    nearby = known.nearby_positions.unknowns_at(target.inputs.u.tolist()) if target.unit == start.unit else None
-    if nearby is not None:
-        return target.state(nearby, remarks)
+    sure = known.nearby_positions.unknowns_at(target.inputs.u.tolist()) if target.unit == start.unit else None
+    if sure is not None:
+        return target.state(sure, remarks)
     from planar.solving.continuation.path import follow_straight  # most paths are surely regular
 
     # in lengths of the start's size: without a link's length a farther input makes the size greater
     u = target.inputs.u * (target.input_scale / start.input_scale)
-    path = follow_straight(start, z, start.inputs.u, u)
-    if path.passed or path.nearby:
+    z, passed, nearby = follow_straight(start, z, start.inputs.u, u)
+    if passed or nearby:
         from planar.solving.continuation.events import change_point_remarks
 
-        remarks = (*remarks, *change_point_remarks(start, path.passed, path.nearby))
+        remarks = (*remarks, *change_point_remarks(start, passed, nearby))
     unknown_scale = (start.scale / target.scale)[list(start.equations.unknowns)]
-    return target.state(path.z[-1] * unknown_scale, remarks)
+    return target.state(z * unknown_scale, remarks)
 
 
 def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
@@ -105,8 +104,6 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
 
     Raises NoAnswer where the mechanism cannot be assembled, or inputs leave it free or cannot be moved there.
     """
-    from planar.solving.full_constraints import FullConstraints
-
     known = solved_mechanism(mechanism)
     solver, z, remarks = known.solver, known.assembly.z, known.remarks
     if drives:
@@ -125,7 +122,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     if solver.is_deflated or solver.equations.open_rows:
         jacobian = np.asarray(solver.functions.residuals_and_jacobian(z, u, p)[1])
     else:
-        jacobian = FullConstraints(solver).jacobian(w)
+        jacobian = full_constraints.FullConstraints(solver).jacobian(w)
     mobility = null_space(jacobian).shape[1] if w.size else 0
     if np.any(solver.block_regularity(z) < MIN_REGULARITY):
         note = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"
@@ -149,15 +146,14 @@ class PositionSolver(PreparedMechanism):
         return assembly
 
     def nearest(self) -> Assembly | AssemblySearchFailure:
-        """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
+        """The assembly nearest to the sketch, or where it fails; of pairs that may stay open that of least misfit.
+
+        Raises NoAnswer where the inputs leave links free, or no misfit is within that of the file.
+        """
         if any(stage.is_free for stage in self.equations.blocks):
             raise refusals.free_links(self)
-        if self.equations.open_rows:
-            return self._nearest_least_misfit()
-        return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
-
-    def _nearest_least_misfit(self) -> Assembly:
-        """The assembly of least misfit. Raises NoAnswer where there is none within that of the file."""
+        if not self.equations.open_rows:
+            return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
         exact = PositionSolver(replace(self.mechanism, closes_within=None))
         assembly = least_misfit.find_least_misfit(self, exact, exact._is_regular)
         if isinstance(assembly, AssemblySearchFailure):
@@ -169,19 +165,17 @@ class PositionSolver(PreparedMechanism):
         """The remarks of the mechanism, and those on an assembly."""
         return (*self.mechanism.remarks, *sketch_remarks(self, assembly))
 
-    def block_regularity(self, z: Array) -> Array:
-        """How regular the Jacobian of each block is at unknowns z (blocks,)."""
-        return regularity.regularity(self, regularity.jacobian_at(self, z, self.inputs.u))
-
     def is_surely_regular(self, z: Array) -> bool:
         """Whether every block is surely determined at an assembly."""
-        if self.acceptance is not None:
-            return is_surely_regular(self, z)
-        return bool(self.block_regularity(z).min(initial=1.0) >= MIN_FAST_REGULARITY)
+        if self.acceptance is None:
+            return bool(self.block_regularity(z).min(initial=1.0) >= MIN_FAST_REGULARITY)
+        rest = np.zeros_like(self.inputs.u)
+        result = self.acceptance.position(z, InputSamples(self.inputs.u, rest, rest), self.acceptance_scales)[1]
+        return result.regularity >= MIN_FAST_REGULARITY
 
     def _is_regular(self, z: Array) -> bool:
         """Whether every block of an assembly is determined there."""
-        return is_surely_regular(self, z) or bool(np.all(self.block_regularity(z) >= MIN_REGULARITY))
+        return self.is_surely_regular(z) or bool(np.all(self.block_regularity(z) >= MIN_REGULARITY))
 
     def regularized(self, z: Array) -> tuple[PositionSolver, Array] | None:
         """A solver, and the unknowns, for constraints that are singular at z and all along the motion from there; None
@@ -202,21 +196,15 @@ class PositionSolver(PreparedMechanism):
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
             is_weak = block_regularity[stage.block_index] < MIN_REGULARITY
-            if is_weak and regularity.is_always_singular(self, stage, failure.z):
+            if is_weak and full_constraints.is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
-        if self._is_contradicted(failure):
-            return refusals.too_many_inputs(self)
+        if slice_length(failure.stage.rows) > slice_length(failure.stage.unknowns):
+            # held more than once: by inputs that are more than the pairs leave free, or, where these leave nothing free
+            # by count, by dimensions that have to agree
+            bare = equation_functions(replace(self.mechanism, inputs=())).equations
+            if 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs):
+                return refusals.too_many_inputs(self)
         return refusals.not_assembled(self, failure)
-
-    def _is_contradicted(self, failure: AssemblySearchFailure) -> bool:
-        """Whether what does not close is held more than once because the inputs are more than the pairs leave free.
-
-        Where the pairs leave nothing free by count, it is their dimensions that have to agree.
-        """
-        if slice_length(failure.stage.rows) <= slice_length(failure.stage.unknowns):
-            return False
-        bare = equation_functions(replace(self.mechanism, inputs=())).equations
-        return 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
@@ -244,12 +232,14 @@ class PositionSolver(PreparedMechanism):
         """The state by the general checks, which say why where there is none."""
         residual, pair = self.worst_residual(z)
         if residual > self.tolerance:
-            raise self._open_refusal(z, residual, pair)
+            # what all but closes may not close since it is singular
+            refuse = refusals.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
+            raise refusals.not_closed(self, pair, residual) if refuse is None else refuse()
         if self.equations.open_rows:
             least_misfit.refuse_misfit(self, z, self.inputs.u)
         mobility = self.inputs.u.size
         if not (self.functions.is_square and self._is_regular(z)):
-            mobility, refuse = judgement.judge_velocity(self, z)
+            mobility, refuse = refusals.judge_velocity(self, z)
             regular = None if refuse is None else self.regularized(z)
             if regular is not None:
                 return regular[0].state(regular[1], remarks)
@@ -259,21 +249,18 @@ class PositionSolver(PreparedMechanism):
                     raise refuse()
                 return state
         coordinate_rates, doubt = self._sample_rates(z, {})
-        if doubt is not None and doubt.errors.is_too_inexact[0]:
+        if doubt is not None and doubt.is_too_inexact[0]:
             raise doubt.refusal(self, 0, self.describe_position())
         if doubt is not None:
-            remarks = (*remarks, doubt.remark())
+            remarks += doubt.remarks(lambda _: "")
         return self._checked_state([rates[0] for rates in coordinate_rates], mobility, residual, remarks)
 
-    def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
-        """What to say of a position that does not close: where it all but does, it may be since it is singular."""
-        refuse = judgement.judge_velocity(self, z)[1] if residual <= CLOSED_TOLERANCE else None
-        return refusals.not_closed(self, pair, residual) if refuse is None else refuse()
-
-    def _sample_rates(self, z: Array, branch_rates: Mapping[int, BranchRates]) -> sample_rates.SampleRates:
+    def _sample_rates(
+        self, z: Array, branch_rates: Mapping[int, BranchRates]
+    ) -> tuple[list[Array], sample_rates.AccuracyDoubts | None]:
         """The rates at one sample."""
         u, u1, u2 = (rates[None] for rates in self.inputs[:3])
-        inputs = run_samples.InputRates(u, u1, u2, 0.0 * u)
+        inputs = InputRates(u, u1, u2, 0.0 * u)
         return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
@@ -286,18 +273,16 @@ class PositionSolver(PreparedMechanism):
         if ending is TrackingEnd.STOP and self.stops is not None:
             met = self.stops.describe_met(self.stop_positions(point.y[:-1], u))
             return refusals.motion_stopped(self, met, self.describe_inputs(u))
-        return refusals.motion_ended(
-            self, regularity.moved_links(self, point.tangent[:-1]), self.describe_inputs(u), ending
-        )
+        return refusals.motion_ended(self, [point.tangent[:-1]], self.describe_inputs(u), ending)
 
     def _singular_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
         """The state where one more than the inputs could move to first order, if only one motion goes on."""
         from planar.solving.continuation.bifurcation import singular_rates  # few positions are of this kind
 
-        s, rates = self.inputs, singular_rates(self, z)
-        if rates is None or (residual := self.max_residual(rates.z, s.u)) > self.tolerance:
+        s, position_and_rates = self.inputs, singular_rates(self, z)
+        if position_and_rates is None or (residual := self.max_residual(position_and_rates[0], s.u)) > self.tolerance:
             return None
-        y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
+        y, y1, y2 = (np.concatenate(parts) for parts in zip(position_and_rates, s[:3], strict=True))
         note = "to first order there is one more motion here; the rates are those of the only one that goes on"
         motion = self.functions.kinematics(y, y1, y2, s.p)
         return self._checked_state([motion.w, motion.w1, motion.w2], s.u.size, residual, (*remarks, note))
@@ -305,10 +290,10 @@ class PositionSolver(PreparedMechanism):
     def state_on_branch(self, z: Array, local: BranchRates) -> State:
         """The state on a change point or beside it, with the rates of the branch that was followed there.
 
-        Raises NoAnswer where the inputs do not run along the way on which it was followed.
+        Raises NoAnswer where the inputs do not run in the direction in which it was followed.
         """
         residual = self.max_residual(z, self.inputs.u)
-        rates = [part[0] for part in self._sample_rates(z, {0: local}).coordinate_rates]
+        rates = [part[0] for part in self._sample_rates(z, {0: local})[0]]
         if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
         return self._checked_state(rates, self.inputs.u.size, residual, ())
@@ -385,7 +370,7 @@ class SolvedMechanism:
         solver, assembly = self.plain_solver, self.nearest
         if not isinstance(assembly, Assembly):
             return solver, assembly
-        regular = None if is_surely_regular(solver, assembly.z) else solver.regularized(assembly.z)
+        regular = None if solver.is_surely_regular(assembly.z) else solver.regularized(assembly.z)
         if regular is not None:
             solver, assembly = regular[0], assembly._replace(z=regular[1])
         assembly.z.flags.writeable = False
@@ -421,9 +406,7 @@ class SolvedMechanism:
             z = self.assembly.z
         except NoAnswer:
             return False
-        from planar.solving.diagnosis.redundancy import is_rigid
-
-        return is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
+        return full_constraints.is_rigid(solver, solver.functions.coordinates(z, solver.inputs.u, solver.inputs.p))
 
     def motion_refusal(self, pair: str | None = None) -> NoAnswer | None:
         """Why no input can run from the mechanism's position, whatever its range; None where one can.
@@ -443,7 +426,7 @@ class SolvedMechanism:
         at_rest = replace(mechanism, inputs=inputs, remarks=(), loads=())
         refusals_at_rest = solved_mechanism(at_rest)._refusals_at_rest
         if pair not in refusals_at_rest:
-            refusals_at_rest[pair] = judgement.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
+            refusals_at_rest[pair] = refusals.judge_motion(self.solver.with_inputs_of(at_rest), z, pair)
         return refusals_at_rest[pair]
 
     def structure_refusal(self, problem: NoAnswer) -> NoAnswer | None:
@@ -503,7 +486,7 @@ def rest_remarks(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def stopped_at_start(solver: PositionSolver, z: Array, problem: NoAnswer) -> NoAnswer:
-    """What to say of a run that did not leave its first position: if that is a change point, which ways lead on."""
+    """Why a run did not leave its first position: if that is a change point, which branches lead on."""
     if problem.outcome is Outcome.BRANCH_LOST:
         try:
             solver.state(z)

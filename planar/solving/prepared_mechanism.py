@@ -14,6 +14,7 @@ from planar.equations.coordinates import FRAME_PARTS, coordinate_columns, frames
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links, size_from_extents
 from planar.equations.residuals import pair_residuals, split_pair_numbers, wrapped_residual
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
@@ -35,6 +36,7 @@ from planar.model.mechanism import (
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
 from planar.solving.checks.residual_check import ResidualCheck, residual_tolerance, stack_motion
+from planar.solving.checks.singular_values import column_norms
 
 if TYPE_CHECKING:
     from planar.solving.stops import MetStop, PairStops
@@ -210,8 +212,12 @@ class PreparedMechanism:
         self.tolerance = float(residual_tolerance(len(mechanism.links), reach))
         "what the residual check lets pass: round-off of the residual, in lengths of the size"
         if self.equations.open_rows:
-            numbers = np.append(numbers, self._misfit_weights())
-        self.inputs = PositionInputs(*self._inputs(mechanism), numbers)
+            # the square of each misfit counts as the stiffness of its pair, beside the greatest
+            stiffness = dict(mechanism.pair_stiffness)
+            owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
+            weights = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
+            numbers = np.append(numbers, weights / weights.max())
+        self.inputs = self._position_inputs(mechanism, numbers)
 
     def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
@@ -221,7 +227,7 @@ class PreparedMechanism:
             return other.with_functions(self.functions) if self.is_deflated else other
         other = copy(self)
         other.mechanism = mechanism
-        other.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
+        other.inputs = self._position_inputs(mechanism, self.inputs.p)
         return other
 
     def keeps_its_numbers(self, mechanism: Mechanism) -> bool:
@@ -255,13 +261,6 @@ class PreparedMechanism:
     def stops_at(self, z: Array, u: Array) -> tuple[MetStop, ...]:
         """The stops that pairs meet at unknowns and inputs."""
         return self.stops.met_at(self.stop_positions(z, u)) if self.stops else ()
-
-    def _misfit_weights(self) -> Array:
-        """By how much the square of each misfit counts: as the stiffness of its pair, beside the greatest."""
-        stiffness = dict(self.mechanism.pair_stiffness)
-        owners = [self.structure.residual_check.row_pairs[row] for row in self.equations.open_rows]
-        weights = np.array([stiffness.get(self.pairs[name].entry_name(), 1.0) for name in owners])
-        return weights / weights.max()
 
     def refuse_misfit(self, what: str) -> None:
         """Raise BadInput where pairs may stay open by a misfit: `what` is told of pairs that close alone."""
@@ -300,10 +299,10 @@ class PreparedMechanism:
         """Whether it has more constraints than those of its pairs and inputs."""
         return self.functions is not self.structure.functions
 
-    def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
-        """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
+    def _position_inputs(self, mechanism: Mechanism, p: Array) -> PositionInputs:
+        """The inputs of a mechanism with the numbers p of its pairs."""
         u, u1, u2 = np.array([*self.scaled_inputs(mechanism)], dtype=float).reshape(3, -1)
-        return u, u1, u2
+        return PositionInputs(u, u1, u2, p)
 
     def scaled_inputs(self, mechanism: Mechanism) -> Iterator[list[float]]:
         """Positions, velocities and accelerations of a mechanism's inputs, lengths in sizes."""
@@ -345,6 +344,30 @@ class PreparedMechanism:
     def min_column_scale(self) -> Array:
         """What the column of every unknown could be at best in its block, rows divided so (unknowns,)."""
         return self.acceptance_scales.column_floor
+
+    def block_regularity(self, z: Array, u: Array | None = None) -> Array:
+        """How regular the Jacobian of each block is (blocks,) at unknowns z and inputs u, or the file's own."""
+        u = self.inputs.u if u is None else u
+        return self.jacobian_regularity(self.functions.jacobians(z[None], u[None], self.inputs.p)[0][0])
+
+    def jacobian_regularity(self, jacobian: Array | SparseMatrices) -> Array:
+        """The least singular value of each block of a Jacobian (..., blocks), each column divided by what its links
+        could reach at best.
+
+        Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
+        their size nor that of the mechanism matters. `jacobian` is (..., rows, unknowns).
+        """
+        least_values: Array = np.ones((*jacobian.shape[:-2], len(self.equations.blocks)))
+        for index, block in enumerate(self.equations.blocks):
+            block_jacobian = jacobian[..., block.rows, block.unknowns] / self.row_scale[block.rows, None]
+            sizes = column_norms(block_jacobian, self.min_column_scale[block.unknowns])
+            rows, columns = block_jacobian.shape[-2:]
+            if rows < columns:
+                least_values[..., index] = 0.0
+            elif columns:
+                values = np.linalg.svd(block_jacobian / sizes[..., None, :], compute_uv=False)
+                least_values[..., index] = values[..., -1] / np.maximum(1.0, values[..., 0])
+        return least_values
 
     @property
     def row_pairs(self) -> list[str]:

@@ -14,7 +14,7 @@ from planar.model.pairs.base import sample_shape
 from planar.model.pairs.guide_line import LinkLine
 from planar.solving.checks.residual_check import stack_motion
 from planar.solving.continuation import path, predictor_corrector
-from planar.solving.continuation.path_pieces import Period
+from planar.solving.continuation.path import Period
 from planar.solving.position import PositionSolver
 from tests.builders import four_bar_document, slider_crank_document
 from tests.draws import draws, part

@@ -6,9 +6,8 @@ import pytest
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving import position
-from planar.solving.checks.branch_check import is_move_allowed
+from planar.solving.continuation.fast_path import is_move_allowed, resting_inputs
 from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver
 from planar.solving.rates import sample_rates
 from tests.acceptance import spoil_runs

@@ -9,7 +9,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.checks import branch_check
+from planar.solving.continuation import fast_path
 from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
 from tests.builders import block_slider_crank, four_bar
@@ -390,10 +390,10 @@ def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_and_it
     assert not other.any()
     for name in ("keep_direction", "keep_signs"):
         with monkeypatch.context() as without:
-            without.setattr(branch_check, name, lambda *given: True)
+            without.setattr(fast_path, name, lambda *given: True)
             assert not any(list(judged(seed))[1] for seed in range(40))
-    monkeypatch.setattr(branch_check, "keep_direction", lambda *given: True)
-    monkeypatch.setattr(branch_check, "keep_signs", lambda *given: True)
+    monkeypatch.setattr(fast_path, "keep_direction", lambda *given: True)
+    monkeypatch.setattr(fast_path, "keep_signs", lambda *given: True)
     assert sum(list(judged(seed))[1] for seed in range(40))
 
 
@@ -567,7 +567,7 @@ def test_a_row_whose_rates_break_a_constraint_has_none_and_is_named(monkeypatch,
 
     def spoiled(*given):
         rated = real(*given)
-        rated.coordinate_rates[order][3] *= 1.01
+        rated[0][order][3] *= 1.01
         return rated
 
     monkeypatch.setattr(motion_rows, "sample_rates", spoiled)

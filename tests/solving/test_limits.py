@@ -333,8 +333,8 @@ def test_a_run_says_how_far_it_has_come():
 
 
 def test_a_run_that_takes_too_much_work_says_how_far_it_came(monkeypatch):
-    monkeypatch.setattr("planar.solving.runs.range_run.MAX_ARCS", 10)
-    monkeypatch.setattr("planar.solving.runs.range_run.ARCS_PER_TURN", 0)
+    monkeypatch.setattr("planar.solving.cycle.MAX_ARCS", 10)
+    monkeypatch.setattr("planar.solving.cycle.ARCS_PER_TURN", 0)
     mechanism = four_bar(*ROCKER, 1.0)
     motion = planar.cycle(mechanism, 2, stop=1.0 + 0.9 * TURN)
     assert motion.outcome is Outcome.BRANCH_LOST
@@ -352,7 +352,7 @@ def test_of_a_range_that_takes_too_much_work_one_way_the_other_end_is_told_as_we
     for k, link in enumerate(value["links"].values()):
         if "length" in link:
             link["length"] *= 1 + 1e-5 * np.sin(7.0 * k)
-    monkeypatch.setattr("planar.solving.runs.range_run.MAX_ARCS", 100)
+    monkeypatch.setattr("planar.solving.cycle.MAX_ARCS", 100)
     motion = planar.cycle(files.from_dict(value), 6)
     assert motion.outcome is Outcome.BRANCH_LOST
     low, high = motion.inputs["foot"].position[[0, -1]]

@@ -620,7 +620,7 @@ def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monk
 
 
 def test_a_range_whose_start_is_out_of_contact_is_refused_as_the_position_is(monkeypatch):
-    monkeypatch.setattr("planar.solving.runs.range_run.MAX_ARCS", 400)  # nothing else ends so long a way
+    monkeypatch.setattr("planar.solving.cycle.MAX_ARCS", 400)  # nothing else ends so long a way
     wheel = planar.load("rolling-wheel").with_values(
         {
             "frame.O.x": 0.01344,

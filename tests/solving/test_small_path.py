@@ -15,8 +15,7 @@ from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
-from planar.solving.continuation.fast_path import fast_position, fast_run
-from planar.solving.continuation.run_samples import InputRates
+from planar.solving.continuation.fast_path import InputRates, fast_position, fast_run
 from planar.solving.position import PositionSolver, SolvedMechanism
 from tests.acceptance import spoil_runs
 from tests.builders import four_bar
@@ -63,7 +62,7 @@ def test_the_quick_path_tells_what_the_general_one_does(name, monkeypatch):
     quick = planar.solve(model), planar.cycle(model, 60)
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
     monkeypatch.setattr(path, "fast_run", lambda *_: None)
-    monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
+    monkeypatch.setattr("planar.solving.cycle.fast_run", lambda *_: None)
     slow = PositionSolver(model).state(PositionSolver(model).find_assembly().z), planar.cycle(model, 60)
     for one, other in zip(quick, slow, strict=True):
         assert one.remarks == other.remarks

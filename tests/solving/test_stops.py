@@ -170,7 +170,7 @@ def test_compiled_rows_meet_the_stops_that_the_general_path_meets(model, pair, s
     mechanism = replace(free, stops=(stops,), published=())
     fast = planar.cycle(mechanism, steps)
     monkeypatch.setattr("planar.solving.continuation.path.fast_run", lambda *_: None)
-    monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
+    monkeypatch.setattr("planar.solving.cycle.fast_run", lambda *_: None)
     slow = planar.cycle(replace(mechanism, name="again"), steps)
     assert (fast.outcome, fast.reason, len(fast)) == (slow.outcome, slow.reason, len(slow))
     (given,) = fast.inputs

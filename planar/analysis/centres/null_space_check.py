@@ -17,7 +17,6 @@ from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.regularity import jacobian_at, regularity
 
 AS_ONE_RATIO = 1e-7
 """Links that move this little against each other, beside the greatest motion, move as one on a dead point.
@@ -118,7 +117,7 @@ def allowed_motions(state: State, middle: Array, size: float) -> AllowedMotions:
 def _as_one_ratio(here: FullPosition) -> float:
     """What rounding leaves of no motion at a position: the more, the nearer to a dead point or a change point it is."""
     setup = here.prepared
-    strength = regularity(setup, jacobian_at(setup, here.w[list(setup.equations.unknowns)], setup.inputs.u))
+    strength = setup.block_regularity(here.w[list(setup.equations.unknowns)])
     return min(AS_ONE_RATIO, REST_TOLERANCE / max(float(strength.min(initial=1.0)), REST_TOLERANCE))
 
 

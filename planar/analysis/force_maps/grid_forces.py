@@ -14,8 +14,8 @@ from planar.foundation.errors import NoAnswer
 from planar.foundation.time_limit import stop_if_over
 from planar.results.motion import Motion
 from planar.solving.assembly.nearest_assembly import Assembly
+from planar.solving.continuation.fast_path import resting_inputs
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.input_grid import motion_at_inputs
 from planar.solving.position import PositionSolver
 

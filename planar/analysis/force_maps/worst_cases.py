@@ -24,8 +24,8 @@ from planar.foundation.errors import NoAnswer, Outcome, join_names
 from planar.foundation.short_repr import short_repr
 from planar.foundation.time_limit import all_within_time
 from planar.model.wording import amount
+from planar.solving.continuation.fast_path import resting_inputs
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.input_grid import Border, InputGrid
 
 STENCIL = (-1.0, -0.5, 0.0, 0.5, 1.0)

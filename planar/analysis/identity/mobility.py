@@ -13,8 +13,12 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase, join_all_names
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure
 from planar.solving.checks.singular_values import null_space, rank
-from planar.solving.diagnosis.redundancy import smallest_dependent_sets
-from planar.solving.full_constraints import FullConstraints, find_closed_position, motion_dimension
+from planar.solving.full_constraints import (
+    FullConstraints,
+    find_closed_position,
+    motion_dimension,
+    smallest_dependent_sets,
+)
 from planar.solving.position import PositionSolver, SolvedMechanism, solved_mechanism
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from planar.assemblies.circuits.traced_circuit import BranchLeg, TracedCircuit
 from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
-from planar.solving.continuation.path_pieces import PathPiece
+from planar.solving.continuation.path import PathPiece
 from planar.solving.continuation.solution_curve import pair_motions_at
 from planar.solving.stops import PairStops
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd, join_names
-from planar.solving.continuation.path_pieces import (
+from planar.solving.continuation.path import (
     MAX_PIECES,
     PathPiece,
     follow_circuit,
@@ -143,7 +143,7 @@ def trace_circuit(solver: PositionSolver, index: int, z: Array) -> TracedCircuit
         whole = follow_circuit(walk)
     except NoAnswer as problem:
         return _trace_open_circuit(solver, index, z, problem.reason.split(";")[0])
-    legs = [BranchLeg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.branches]
+    legs = [BranchLeg(walk.curve, stretch, first, 1.0) for stretch in whole.branches]
     if not legs:
         given = solver.mechanism.inputs[index].pair
         raise NoAnswer(Outcome.TOO_MANY_INPUTS, f"the input at {given!r} cannot move; leave it out")
@@ -181,7 +181,7 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
             stopped.append(first + way * float(walk.point.y[-1]))
         elif not (out or walk.limit is not None):
             lost = reason
-        sides.append([BranchLeg(walk.curve, each.pieces, first, way) for each in split_at_dead_points(found)])
+        sides.append([BranchLeg(walk.curve, each, first, way) for each in split_at_dead_points(found)])
     back, ahead = sides
     home = (*back[:1], *ahead[:1])  # none where no way on is found at all
     branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []

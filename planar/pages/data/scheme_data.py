@@ -42,9 +42,8 @@ from planar.model.pairs import Pair
 from planar.model.pairs.symbols import DrawingMark
 from planar.pages.data.dimension_numbers import DimensionNumber, DimensionNumbers, DrawingNumbers
 from planar.results.motion import Motion
-from planar.solving.continuation.fast_path import fast_run
+from planar.solving.continuation.fast_path import fast_run, resting_inputs
 from planar.solving.continuation.path import follow_samples
-from planar.solving.continuation.run_samples import resting_inputs
 from planar.solving.position import PositionSolver, solved_mechanism
 
 Positions = Sequence[Mapping[str, Frame]]

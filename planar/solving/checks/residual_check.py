@@ -1,7 +1,7 @@
 """The residual check that every answer passes: is every constraint closed, are its rates?
 
 It knows nothing of elimination or Newton: it runs the pairs' own formulas on plain numbers (`constraint_check`). The
-second part, since the residual of a flipped linkage is zero too, is `branch_check`.
+second part, since the residual of a flipped linkage is zero too, is the branch check of `continuation.fast_path`.
 """
 
 from __future__ import annotations

@@ -35,13 +35,13 @@ LEAST_VALUES = 8
 MOST_SMALL_VALUES = 4
 """Singular values, with the one that is zero, that are brought to zero together where single ones do not lead there."""
 ON_BRANCH_RATIO = 1e-2
-"""A point is on a way if it is no further from it than this part of its distance from the change point."""
+"""A point is on a branch if it is no further from it than this part of its distance from the change point."""
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
 AT_BIFURCATION_DISTANCE = 1e-5
 """So near to a singular Jacobian a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
-"""A rate of the inputs along a way below this is none."""
+"""A rate of the inputs along a branch below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4
 """Half the length of the arc that is taken as a polynomial beside a change point, and where it is given up."""
 ARC_FIT_TOLERANCE = 1e-11
@@ -61,20 +61,11 @@ SETTLED_DIRECTION = 1e-9
 MAX_REFINEMENTS, CONVERGED_STEP = 12, 1e-13
 
 
-class BifurcationCandidate(NamedTuple):
-    """The point nearest to which the Jacobian has more than one null vector, those (n + 1, k), and what the constraints
-    leave open there: nothing but rounding at a change point, more where the curve only comes near one."""
-
-    y: Array
-    null: Array
-    residual: float
-
-
 class Bifurcation(NamedTuple):
-    """A change point with the ways through it, points at one place whose tangents are the ways: first the one that
-    leads from where the walk came.
+    """A change point with the branches through it, points at one place with the tangents of the branches: first the one
+    by which the tracker came.
 
-    `is_complete` says whether these are all; where ways touch one another, or are very many, they are not told.
+    `is_complete` says whether these are all; where branches touch one another, or are very many, some are missing.
     `rank_loss` is how much rank the Jacobian lacks.
     """
 
@@ -84,38 +75,41 @@ class Bifurcation(NamedTuple):
     rank_loss: int
 
 
-def bifurcation_candidates(curve: SolutionCurve, point: CurvePoint, farthest: float) -> Iterator[BifurcationCandidate]:
-    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds by steps
-    no longer than `farthest`.
+def bifurcation_candidates(curve: SolutionCurve, point: CurvePoint, farthest: float) -> Iterator[ConstraintsAt]:
+    """The points next to this one at which the Jacobian has more than one null vector, those to which Newton's method
+    converges by steps no longer than `farthest`.
+
+    The constraints leave nothing but rounding open there at a change point, more where the curve only comes near one.
 
     Each of the least singular values that is small is brought to zero; where several loops come near a change point at
     once, each is found.
     Where many are small alike, as at the flat position of a scissor lift, they are first brought to zero together.
     """
     y = point.y + min(point.regular_distance, 0.1) * point.tangent
-    start = _decompose(curve, y)
+    start = constraints_at(curve, y)
     small = start.values < min(SMALL_SINGULAR_VALUE * start.greatest, ALIKE_RATIO * start.values[-1])
     if MOST_SMALL_VALUES <= small.sum() <= MOST_ALIKE_VALUES:
-        candidate = _refine_candidate(curve, y, start.right[-1 - small.sum() :].T, start, farthest)
+        candidate = _refine_candidate(curve, start, start.right[-1 - small.sum() :].T, farthest)
         if candidate is not None:
             yield candidate
     for second in range(2, min(len(start.right), LEAST_VALUES + 1) + 1):
         if second > 2 and start.values[1 - second] > SMALL_SINGULAR_VALUE * start.greatest:
             return
-        candidate = _refine_candidate(curve, y, start.right[[-second, -1]].T, start, farthest)
+        candidate = _refine_candidate(curve, start, start.right[[-second, -1]].T, farthest)
         if candidate is None and 2 < second <= MOST_SMALL_VALUES:
-            candidate = _refine_candidate(curve, y, start.right[-second:].T, start, farthest)
+            candidate = _refine_candidate(curve, start, start.right[-second:].T, farthest)
         if candidate is not None and candidate.null.shape[1] > 2:
-            candidate = _refine_candidate(curve, candidate.y, candidate.null)
+            candidate = _refine_candidate(curve, candidate, candidate.null)
         if candidate is not None:
             yield candidate
 
 
-class _Decomposition(NamedTuple):
-    """The constraints at a point: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those on
-    the left as columns and those on the right as rows; the least ones alone where unknowns are many. `greatest` is no
-    less than the greatest of them, or than one."""
+class ConstraintsAt(NamedTuple):
+    """The constraints at a point y: F (rows,), J (rows, n + 1), and the singular values of J with their vectors, those
+    on the left as columns and those on the right as rows; the least ones alone where unknowns are many. `greatest` is
+    no less than the greatest of them, or than one."""
 
+    y: Array
     residual: Array
     jacobian: Array | SparseMatrices
     left: Array
@@ -128,54 +122,50 @@ class _Decomposition(NamedTuple):
         """The null vectors of J (n + 1, k)."""
         return self.right[int(np.sum(self.values > SINGULAR_TOLERANCE * self.greatest)) :].T
 
+    @property
+    def gap(self) -> float:
+        """What the worst constraint leaves open."""
+        return greatest_size(self.residual)
 
-def _decompose(curve: SolutionCurve, y: Array, count: int = LEAST_VALUES) -> _Decomposition:
+
+def constraints_at(curve: SolutionCurve, y: Array, count: int = LEAST_VALUES) -> ConstraintsAt:
     """The constraints at y, with `count` of the least singular values where unknowns are many."""
     residual, jacobian = curve.residuals_and_jacobian(y)
     if isinstance(jacobian, SparseMatrices):
         try:
             vectors = BorderedJacobian(jacobian, np.ones(len(y))).least_singular_vectors(count)
-            return _Decomposition(residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
+            return ConstraintsAt(y, residual, jacobian, *vectors, max(jacobian.greatest_singular_value_bound(), 1.0))
         except ValueError:
             jacobian = np.asarray(jacobian)
     left, values, right = np.linalg.svd(jacobian)
-    return _Decomposition(residual, jacobian, left, values, right, max(values[0], 1.0) if values.size else 1.0)
+    return ConstraintsAt(y, residual, jacobian, left, values, right, max(values[0], 1.0) if values.size else 1.0)
 
 
 def _refine_candidate(
-    curve: SolutionCurve,
-    y: Array,
-    null_start: Array,
-    start: _Decomposition | None = None,
-    longest_step: float = 1.0,
-) -> BifurcationCandidate | None:
-    """The point next to y, where the constraints are as at the `start`, at which the Jacobian has null vectors next to
-    these (n + 1, k); None where Newton's method does not settle by steps no longer than the longest.
-    """
-
+    curve: SolutionCurve, start: ConstraintsAt, null_start: Array, longest_step: float = 1.0
+) -> ConstraintsAt | None:
+    """The point next to a start at which the Jacobian has null vectors next to these (n + 1, k); None where Newton's
+    method does not settle by steps no longer than the longest."""
     count = null_start.shape[1] + MORE_VALUES
 
-    def step_at(tried: Array) -> tuple[Array, Array]:
-        constraints = start if start is not None and tried is y else _decompose(curve, tried, count)
-        return _step_to_lower_rank(curve, tried, constraints, null_start), np.zeros((0, 0))
+    def step_at(y: Array) -> tuple[Array, Array]:
+        constraints = start if y is start.y else constraints_at(curve, y, count)
+        return _step_to_lower_rank(curve, constraints, null_start), np.zeros((0, 0))
 
-    settled_at = (len(y), CONVERGED_STEP)
-    settled, is_settled = settle(step_at, lambda _, step: step, y, MAX_REFINEMENTS, settled_at, longest_step)
-    if not is_settled:
-        return None
-    decomposition = _decompose(curve, settled)
-    gap = float(np.max(np.abs(decomposition.residual), initial=0.0))
-    return BifurcationCandidate(settled, decomposition.null, gap) if decomposition.null.shape[1] > 1 else None
+    settled_at = (len(start.y), CONVERGED_STEP)
+    y, is_settled = settle(step_at, lambda _, step: step, start.y, MAX_REFINEMENTS, settled_at, longest_step)
+    candidate = constraints_at(curve, y) if is_settled else None
+    return candidate if candidate is not None and candidate.null.shape[1] > 1 else None
 
 
-def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposition, null_start: Array) -> Array:
+def _step_to_lower_rank(curve: SolutionCurve, constraints: ConstraintsAt, null_start: Array) -> Array:
     """A step of Newton's method for the rank of the Jacobian, after Lyapunov and Schmidt.
 
     Of the singular vectors those next to the null vectors that are sought, N on the right and L on the left, are set
     apart. The step closes F along all others, and moves along N so that L^T J N vanishes to first order. Where L^T F
     stays open the curve only comes near a change point. Further singular values that are zero close nothing.
     """
-    residual, jacobian, left, values, right, greatest = constraints
+    y, residual, jacobian, left, values, right, greatest = constraints
     nearest = np.argsort(-np.linalg.norm(right @ null_start, axis=1), kind="stable")[: null_start.shape[1]]
     others = np.setdiff1d(np.arange(len(values)), nearest)
     null, left_null = right[nearest].T, np.delete(left, others, axis=1)
@@ -197,7 +187,7 @@ def _step_to_lower_rank(curve: SolutionCurve, y: Array, constraints: _Decomposit
 
 
 class _BranchConditions:
-    """The conditions of second and third order for ways through one change point."""
+    """The conditions of second and third order for branches through one change point."""
 
     def __init__(self, curve: SolutionCurve, y: Array):
         self.curve, self.y = curve, y
@@ -207,7 +197,7 @@ class _BranchConditions:
         self.forms = curve.weighted_hessian_products(y, self.left_null, self.null) @ self.null
 
     def branch_along(self, c: Array, sideways: Array | float = 0.0) -> CurvePoint | None:
-        """The way with tangent null c and its second derivative; None where the third order leaves it open.
+        """The branch with tangent null c and its second derivative; None where the third order leaves it open.
 
         `sideways` is the second derivative of the inputs (inputs,) by how far they are on their straight line, where
         they bend off it.
@@ -230,7 +220,7 @@ class _BranchConditions:
 
 
 def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifurcation | None:
-    """A change point with the ways through it, if one of them leads from a point beside it."""
+    """A change point with the branches through it, if one of them leads from a point beside it."""
     conditions = _BranchConditions(curve, y)
     first = nearest_direction(conditions.forms, conditions.null.T @ (y - point.y))
     coming = None if first is None else conditions.branch_along(first)
@@ -243,10 +233,10 @@ def bifurcation_ahead(curve: SolutionCurve, point: CurvePoint, y: Array) -> Bifu
 
 
 def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
-    """The change point on which a position lies to rounding, with all ways on which the inputs move.
+    """The change point on which a position lies to rounding, with all branches on which the inputs move.
 
-    First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
-    such point.
+    First those on which the unknowns move least for the inputs, in whichever direction these go; None where the
+    position is no such point.
     """
     conditions = _conditions_at_start(curve, y)
     if conditions is None:
@@ -260,7 +250,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     ]
     if not outgoing:
         return None
-    # as the inputs' own way goes, so that both ways from here count alike
+    # in the direction of the inputs, so that both directions from here count alike
     sense = np.sign(curve.input_direction[np.argmax(np.abs(curve.input_direction))])
     rates = [tuple(np.round(sense * branch.tangent[:-1] / branch.input_rate, 6)) for branch in outgoing]
     order = sorted(range(len(outgoing)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
@@ -270,30 +260,23 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
 
 def _conditions_at_start(curve: SolutionCurve, y: Array) -> _BranchConditions | None:
     """The conditions at the change point on which a position lies to rounding; None where it is none."""
-    start = _decompose(curve, y)
+    start = constraints_at(curve, y)
     counts = dict.fromkeys((max(start.null.shape[1], 2), 2))
-    refined = (_refine_candidate(curve, y, start.right[-count:].T, start) for count in counts)
+    refined = (_refine_candidate(curve, start, start.right[-count:].T) for count in counts)
     near = next((candidate for candidate in refined if candidate is not None), None)
     if near is not None and near.null.shape[1] > 2:
-        near = _refine_candidate(curve, near.y, near.null)
-    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
+        near = _refine_candidate(curve, near, near.null)
+    if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.gap > curve.solver.tolerance:
         return None
     return _BranchConditions(curve, near.y)
 
 
-class SingularRates(NamedTuple):
-    """A position at a singularity, to round-off, with the rates of the one motion that goes on through it."""
-
-    z: Array
-    z1: Array
-    z2: Array
-
-
-def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
-    """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
+def singular_rates(setup: PreparedMechanism, z: Array) -> tuple[Array, Array, Array] | None:
+    """A singular position near z, to round-off, of one freedom more than inputs, with the first and second rates of the
+    one motion through it; None if it is not one."""
     u1, u2 = setup.inputs.u1, setup.inputs.u2
     if not u1.size:
-        return None  # no input says which way
+        return None  # no input gives a direction
     speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
     # inputs that only start to move go as their accelerations say, those that stand still as the first of them
     axis = u1 if speed > 0.0 else u2 if gain > 0.0 else np.eye(u1.size)[0]
@@ -314,12 +297,12 @@ def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     second = (branch.curvature[:-1] - first * t2) / t1**2
     z = branch.y[:-1] - t * first
     if speed > 0.0:
-        return SingularRates(z, first * speed, (second + first * along) * speed**2)
-    return SingularRates(z, 0.0 * first, first * gain)
+        return z, first * speed, (second + first * along) * speed**2
+    return z, 0.0 * first, first * gain
 
 
 def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bool:
-    """Whether a way through a change point leads to a point beside it."""
+    """Whether a branch through a change point leads to a point beside it."""
     distance = float(branch.tangent @ (branch.y - point.y))
     if distance * float(branch.tangent @ point.tangent) <= 0.0:
         return False
@@ -328,7 +311,7 @@ def _leads_to(curve: SolutionCurve, point: CurvePoint, branch: CurvePoint) -> bo
 
 
 def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) -> Arc | None:
-    """The arc from one side of a change point to the other along one way through it: a polynomial of eighth degree.
+    """The arc from one side of a change point to the other along one branch: a polynomial of eighth degree.
 
     Its error falls with the ninth power of its length; so far that rounding is all that is left.
     """

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, greatest_size
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root_by_slope, lowest_on_cubic
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import count_phrase, join_all_names
 from planar.results.records import Limit
-from planar.solving.continuation.path_pieces import PathPiece, PeriodSearch, path_pieces
+from planar.solving.continuation.path import PathPiece, PeriodicPieces
 from planar.solving.continuation.predictor_corrector import (
     END_TOLERANCE,
     CurveTracker,
@@ -51,7 +51,7 @@ def watched_outputs(setup: PreparedMechanism) -> tuple[Pair, ...]:
 
 
 def _pieces_until(pieces: Iterable[PathPiece], last: float) -> Iterator[PathPiece]:
-    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it.
+    """The pieces of a curve up to a place of the inputs, or to the dead point before it.
 
     A dead point at the very place, to rounding, is not left out.
     """
@@ -74,13 +74,13 @@ class LocatedLimit(NamedTuple):
     passed: PassedBifurcation | None = None
 
     def in_direction(self, direction: float) -> LocatedLimit:
-        """The same, its point on the curve along which the input goes the other way, if that is -1."""
+        """The same, its point on the curve along which the input goes in the other direction, if that is -1."""
         y = np.append(self.point.y[:-1], direction * self.point.y[-1])
         return self._replace(point=self.point._replace(y=y))
 
 
 class LimitSearch:
-    """Looks for what a walk meets on which the input at `pair` runs from `start` in a direction, 1 or -1."""
+    """Looks for what a tracker meets while the input at `pair` runs from `start` in a direction, 1 or -1."""
 
     def __init__(self, pair: str, start: float, direction: float, tracker: CurveTracker):
         self.pair, self.start, self.direction, self.tracker = pair, start, direction, tracker
@@ -89,18 +89,17 @@ class LimitSearch:
         self.unit = self.setup.unit if self.setup.is_sliding(pair) else 1.0
 
     def until(self, last: float) -> Iterator[LocatedLimit]:
-        """What the walk meets up to a place of the input on its way.
+        """What the tracker meets up to a place of the input.
 
-        Of a walk that comes back after some turns of the input what it meets in these is reported for all.
+        Of a curve that comes back after some turns of the input what is met in these is reported for all turns.
         """
         known: list[PathPiece] = []
-        begin = self.tracker.point
-        pieces, search, period = path_pieces(self.tracker), PeriodSearch(self.tracker), None
+        begin, pieces = self.tracker.point, PeriodicPieces(self.tracker)
         for piece in pieces:
             known.append(piece)
-            period = search.period_after(piece)
-            if period is not None or piece.dead_point is not None or piece.stop > last:
+            if pieces.period is not None or piece.dead_point is not None or piece.stop > last:
                 break
+        period = pieces.period
         if period is None or last < period.length:
             yield from self.along(_pieces_until(chain(known, pieces), last), last, begin)
             return
@@ -145,94 +144,85 @@ class LimitSearch:
     def along(
         self, pieces: Iterable[PathPiece], last: float = np.inf, begin: CurvePoint | None = None
     ) -> Iterator[LocatedLimit]:
-        """What the walk meets on pieces of its curve, up to a place of the input or along a circuit; `begin` is
+        """What the tracker meets on pieces of its curve, up to a place of the input or along a circuit; `begin` is
         where they begin, if that may be a dead point."""
         curve, passed_count = self.curve, 0
         if begin is not None and begin.is_dead_point:
             yield self._located("input dead point", self.pair, begin)
-        before: _PieceEnd | None = None
+        before: CurvePoint | None = None
+        rates_before: Array = np.zeros((0, 3))
         for piece in pieces:
             arc = piece.arc
             if before is None or arc.is_exact:
-                before = self._piece_end(arc.point_at(curve, piece.first, False))
-            last_point = piece.dead_point or (arc.after if piece.last == arc.ends[1] else None)
-            after = self._piece_end(last_point or arc.point_at(curve, piece.last, False))
-            for k, output in enumerate(self.outputs):
-                for x in self._turning_points(piece, (before, after), k):
+                before = arc.point_at(curve, piece.first, False)
+                rates_before = pair_motions_at(self.outputs, curve, before)
+            after = piece.dead_point or (arc.after if piece.last == arc.ends[1] else None)
+            after = after or arc.point_at(curve, piece.last, False)
+            rates_after = pair_motions_at(self.outputs, curve, after)
+            for output, at_first, at_last in zip(self.outputs, rates_before, rates_after, strict=True):
+                for x in self._turning_points(piece, output, ((before, at_first), (after, at_last))):
                     point = arc.point_at(curve, x, False)
-                    yield self._located("stroke end", output.name, point, float(self._output_rates(point, k)[0]))
+                    yield self._located("stroke end", output.name, point, self._output_rates(output, point)[0])
             for passed in self.tracker.passed_until(last)[passed_count:]:
                 if not (passed.is_start or np.array_equal(passed.bifurcation.y, arc.after.y)):
-                    break  # farther on: a walk that has gone its whole way knows them all
+                    break  # farther on: a tracker that has followed all of the curve knows them all
                 remark = change_point_remark(self.setup, passed)
                 yield self._located("change point", self.pair, passed.bifurcation.branches[0], None, remark, passed)
                 passed_count += 1
             if piece.dead_point is not None and piece.first != piece.last:
                 yield self._located("input dead point", self.pair, piece.dead_point)
-            before = after
-        yield from self._at_end()
-
-    def _at_end(self) -> Iterator[LocatedLimit]:
-        """What ends the walk: stops, or that it was followed no further."""
+            before, rates_before = after, rates_after
         point, ending = self.tracker.point, self.tracker.ending
         if ending is TrackingEnd.STOP:
             for stop in self.setup.stops_at(point.y[:-1], self.curve.inputs(point.y)):
                 yield self._located("stop", stop.pair, point, stop.position)
         elif ending in (TrackingEnd.WORK_LIMIT, TrackingEnd.INTERRUPTED):
-            remark = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
+            reason = ": it takes more work than one answer may; name a nearer range"
             if ending is TrackingEnd.INTERRUPTED:
-                remark = "what lies beyond was not followed, as the computation was ended"
+                reason = ", as the computation was ended"
+            remark = f"what lies beyond was not followed{reason}"
             yield self._located("not followed further", self.pair, point, None, remark)
 
-    def _piece_end(self, point: CurvePoint) -> _PieceEnd:
-        return _PieceEnd(point, pair_motions_at(self.outputs, self.curve, point))
+    def _output_rates(self, output: Pair, point: CurvePoint) -> list[float]:
+        """Position, first and second derivative by arc length of one output, SI."""
+        return pair_motions_at((output,), self.curve, point)[0].tolist()
 
-    def _output_rates(self, point: CurvePoint, k: int) -> Array:
-        """Position, first and second derivative by arc length of one output (3,), SI."""
-        rates: Array = pair_motions_at(self.outputs[k : k + 1], self.curve, point)[0]
-        return rates
-
-    def _turning_points(self, piece: PathPiece, ends: tuple[_PieceEnd, _PieceEnd], k: int) -> Iterator[float]:
-        """Where on a piece an output turns back: places on the arc's axis."""
+    def _turning_points(
+        self, piece: PathPiece, output: Pair, ends: tuple[tuple[CurvePoint, Array], tuple[CurvePoint, Array]]
+    ) -> Iterator[float]:
+        """Where on a piece an output turns back: places on the arc's axis; `ends` are points, with the position and the
+        rates of the output there (3,)."""
         arc = piece.arc
-        (_, g0, s0), (_, g1, s1) = (end.output_rates[k] for end in ends)
-        standing = STANDING_RATE * (self.setup.unit if self.outputs[k].input_kind is MeasureKind.LENGTH else 1.0)
-        sense = 1.0 if piece.last > piece.first else -1.0
+        (before, (_, g0, s0)), (after, (_, g1, s1)) = ends
+        standing = STANDING_RATE * (self.setup.unit if output.input_kind is MeasureKind.LENGTH else 1.0)
 
         def rate_and_slope(x: float) -> tuple[float, float]:
             point = arc.point_at(self.curve, x, False)
-            _, rate, second = self._output_rates(point, k)
-            return float(rate), float(second / (arc.axis @ point.tangent))
+            _, rate, second = self._output_rates(output, point)
+            return rate, second / float(arc.axis @ point.tangent)
 
         if max(abs(g0), abs(g1)) < standing:
             return
         # where a piece starts or ends in the very turn, the sign of its rate there is rounding
         zero = ROUNDING_RATE * standing / STANDING_RATE
-        for end, x, g, s in ((ends[0], piece.first, g0, s0), (ends[1], piece.last, g1, s1)):
-            if abs(g) < zero and abs(s) > standing and not end.point.is_dead_point:
+        for point, x, g, s in ((before, piece.first, g0, s0), (after, piece.last, g1, s1)):
+            if abs(g) < zero and abs(s) > standing and not point.is_dead_point:
                 yield x
                 return
         # what only turns back since the input does, at a dead point, has no end of its stroke there
-        g0 = zero * s0 if abs(g0) < zero and ends[0].point.is_dead_point else g0
-        g1 = -zero * s1 if abs(g1) < zero and ends[1].point.is_dead_point else g1
+        g0 = zero * s0 if abs(g0) < zero and before.is_dead_point else g0
+        g1 = -zero * s1 if abs(g1) < zero and after.is_dead_point else g1
         if g0 * g1 < 0.0:
             yield find_root_by_slope(rate_and_slope, (piece.first, piece.last), (g0, g1))
         elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
-            # both ends go one way, but the output may have gone back in between
+            # both ends go in one direction, but the output may have gone back in between
             length, up = abs(piece.last - piece.first), float(np.sign(g0))
             lowest, part = lowest_on_cubic((up * g0, up * s0 * length), (up * g1, up * s1 * length))
-            middle = piece.first + sense * part * length
+            middle = piece.first + part * (piece.last - piece.first)
             rate_at_middle = rate_and_slope(middle)[0] if lowest < 0.0 else 0.0
             if up * rate_at_middle < -standing:
                 yield find_root_by_slope(rate_and_slope, (piece.first, middle), (g0, rate_at_middle))
                 yield find_root_by_slope(rate_and_slope, (middle, piece.last), (rate_at_middle, g1))
-
-
-class _PieceEnd(NamedTuple):
-    """An end of a piece of the curve, and how the outputs move there (outputs, 3)."""
-
-    point: CurvePoint
-    output_rates: Array
 
 
 def distinct_limits(pair: str, curve: SolutionCurve, limits: Iterable[LocatedLimit]) -> tuple[Limit, ...]:
@@ -249,10 +239,8 @@ def _is_same_limit(one: LocatedLimit, other: LocatedLimit) -> bool:
     if one.limit[:2] != other.limit[:2] or abs(one.limit.input - other.limit.input) >= END_TOLERANCE:
         return False
     # of two assemblies some link stands elsewhere, whole turns aside
-    return (
-        float(np.max(np.abs(np.sin(0.5 * (one.point.y[:-1] - other.point.y[:-1]))), initial=0.0))
-        < SAME_ASSEMBLY_TOLERANCE
-    )
+    turned = np.sin(0.5 * (one.point.y[:-1] - other.point.y[:-1]))
+    return greatest_size(turned) < SAME_ASSEMBLY_TOLERANCE
 
 
 def _name_stroke_ends(curve: SolutionCurve, pair: str, limits: list[LocatedLimit]) -> Iterator[Limit]:
@@ -296,21 +284,20 @@ def _pin_distance(curve: SolutionCurve, point: CurvePoint, sliding: tuple[str, s
 def change_point_remarks(
     setup: PreparedMechanism, passed: Sequence[PassedBifurcation], nearby: Sequence[NearbyBifurcation]
 ) -> tuple[str, ...]:
-    """What to say of change points on the way, and near it."""
-    remarks: dict[str, None] = {}
-    for bifurcation in passed:
-        remarks[change_point_remark(setup, bifurcation)] = None
-    for near in nearby:
-        if near.distance < REMARKED_DISTANCE:
-            remarks[
-                f"the motion comes within {near.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
-                f"point of a linkage that differs from this one by {near.residual * setup.unit:.1g} m"
-            ] = None
+    """What to report of change points on a path, and near it."""
+    if not passed and not nearby:
+        return ()
+    remarks = [change_point_remark(setup, bifurcation) for bifurcation in passed]
+    remarks += [
+        f"the motion comes within {near.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
+        f"point of a linkage that differs from this one by {near.residual * setup.unit:.1g} m"
+        for near in nearby
+        if near.distance < REMARKED_DISTANCE
+    ]
+    remarks = list(dict.fromkeys(remarks))
     if len(remarks) > MAX_REMARKS:
-        return (
-            *list(remarks)[:MAX_REMARKS],
-            f"and so on at {count_phrase(len(remarks) - MAX_REMARKS, 'more place')}; see the motion's limits",
-        )
+        rest = f"and so on at {count_phrase(len(remarks) - MAX_REMARKS, 'more place')}; see the motion's limits"
+        remarks[MAX_REMARKS:] = [rest]
     return tuple(remarks)
 
 

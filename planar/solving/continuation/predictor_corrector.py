@@ -46,7 +46,7 @@ SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
 MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than this multiple of the distance within which there is none is another one."""
 MAX_ARCS = 5_000
-"""Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
+"""Arcs that are followed for one answer; a turn of a usual linkage has some fifty."""
 NEAR_SLIDE_EXTENT = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
 MAX_TURNING_EXTENT = 1e5
@@ -55,7 +55,7 @@ SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
 MAX_SLIDE_EXTENT = 6e6
-"""Lengths of the size: farther out than this the residual check tells nothing."""
+"""Lengths of the size: farther out than this the residual check decides nothing."""
 MIN_LIMIT_POWER = 0.25
 """Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
 the square root, which is the lowest that lines becoming parallel give, they do."""
@@ -68,8 +68,8 @@ Lengths: TypeAlias = Any
 
 
 class PassedBifurcation(NamedTuple):
-    """A change point that a walk went through, at inputs u along a direction of them: the ways, by the first of which
-    it came, and by which it went on; or on which it started."""
+    """A change point that a tracker passed, at inputs u along a direction of them, or on which it started; and the
+    index of the branch by which it went on. By the first it came."""
 
     bifurcation: Bifurcation
     branch_index: int
@@ -77,17 +77,17 @@ class PassedBifurcation(NamedTuple):
     input_direction: Array
     is_start: bool = False
     beyond: bool = False
-    """Whether a higher number was asked for than there are ways, so that it took the last."""
+    """Whether a higher number was asked for than there are branches, so that it took the last."""
 
     @property
     def is_switched(self) -> bool:
-        """Whether it went on by another way than smoothly."""
+        """Whether it went on by another branch than the smooth one."""
         return self.branch_index != 0 and not self.is_start
 
 
 class NearbyBifurcation(NamedTuple):
-    """A change point of a neighbouring linkage that a walk came near: where, how near, and by how much this linkage's
-    constraints do not close there (lengths of the size)."""
+    """A change point of a neighbouring linkage that a tracker came near: where, how near, and by how much this linkage
+    does not close there (lengths of the size)."""
 
     y: Array
     distance: float
@@ -97,8 +97,8 @@ class NearbyBifurcation(NamedTuple):
 class ArcBudget:
     """What may be spent on one answer, counted in arcs, each of which is reported with the inputs there."""
 
-    def __init__(self, arcs: int = MAX_ARCS, tell: Callable[[Array], None] | None = None):
-        self.arcs_left, self._report = arcs, tell
+    def __init__(self, arcs: int = MAX_ARCS, report: Callable[[Array], None] | None = None):
+        self.arcs_left, self._report = arcs, report
 
     def spend(self, u: Array) -> bool:
         """Count an arc from inputs u (inputs,); False where nothing is left to spend, or the time is over."""
@@ -150,11 +150,11 @@ class _EndReporter(Protocol):
 
 
 class CurveTracker:
-    """One walk along a curve from a position: its arcs, one after the other, and what it met on the way.
+    """Follows a curve from a position: its arcs, one after the other, and the change points that are met.
 
-    `branches` are the numbers of the ways taken at change points, in the order in which they are met: 1 goes on
-    smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends. On a start on a change point they
-    number the ways through it, on one on a dead point its two ways.
+    `branches` are the numbers of the branches taken at change points, in the order in which these are met: 1 goes on
+    smoothly, 2 takes the branch nearest to that, and so on; 1 where the list ends. On a start on a change point they
+    number the branches through it, on one on a dead point its two branches.
     """
 
     def __init__(
@@ -175,8 +175,7 @@ class CurveTracker:
         self.step = FIRST_STEP
         self._last_search_distance, self._approaching = np.inf, False
         self._start_arc: Arc | None = None
-        self.point = self._start_point(np.append(z, 0.0))
-        self._choose_start_branch()
+        self._set_start(np.append(z, 0.0))
         self.ending = TrackingEnd.BRANCH_LOST
         self.limit: float | None = None
         "the place of the inputs to which the curve tends while a slide goes out without an end"
@@ -190,18 +189,28 @@ class CurveTracker:
         self.is_periodic = np.append(equations.unknown_is_angle, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
-    def _start_point(self, y: Array) -> CurvePoint:
-        """The point at y, to be left so that the inputs go on.
+    def _set_start(self, y: Array) -> None:
+        """Start at y, so that the inputs go on; by a number taken off `branches` where several branches lead on.
 
-        At a dead point two ways lead on: the first so that the most moved unknown grows, the second by a number taken
-        off `branches`.
+        Of the two at a dead point the first is that on which the most moved unknown grows.
         """
-        point = self.curve.point_at(y, input_axis(len(y)))
-        if not point.is_dead_point or point.regular_distance <= AT_BIFURCATION_DISTANCE:
-            return point
-        fastest = int(np.argmax(np.abs(point.tangent)))
-        takes_second = bool(self.branches) and self.branches.pop(0) > 1
-        return point if bool(point.tangent[fastest] > 0.0) is not takes_second else point.reversed()
+        self.point = self.curve.point_at(y, input_axis(len(y)))
+        is_singular = self.point.regular_distance < AT_BIFURCATION_DISTANCE
+        if self.point.is_dead_point and not is_singular:
+            grows = bool(self.point.tangent[int(np.argmax(np.abs(self.point.tangent)))] > 0.0)
+            takes_second = bool(self.branches) and self.branches.pop(0) > 1
+            self.point = self.point.reversed() if grows is takes_second else self.point
+        bifurcation = bifurcation_at_start(self.curve, y) if self.branches and is_singular else None
+        if bifurcation is None:
+            return
+        number = self.branches[0]
+        index = min(number, len(bifurcation.branches)) - 1
+        branch = bifurcation.branches[index]
+        arc = branch_crossing(self.curve, branch, bifurcation.rank_loss)
+        if arc is not None:
+            del self.branches[0]
+            self.point, self._start_arc = branch, arc._replace(before=branch)
+            self._note_passed(bifurcation, index, is_start=True, beyond=number > len(bifurcation.branches))
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
@@ -241,7 +250,9 @@ class CurveTracker:
                 elif extent > farthest:
                     self.ending = TrackingEnd.OUT_OF_RANGE
                 return
-            self._update_nearby(after)
+            for k, near in enumerate(self.nearby):
+                distance = float(np.linalg.norm(after.y - near.y))
+                self.nearby[k] = near._replace(distance=min(near.distance, distance))
             self._approaching = after.regular_distance < point.regular_distance
             arc = arc_between(point, after)
             if self.far_point is None and self._slide_extent(after.y) > shown_extent:
@@ -255,31 +266,15 @@ class CurveTracker:
 
     @property
     def starts_on_bifurcation(self) -> bool:
-        """Whether it starts on a change point, by a way that was asked for."""
+        """Whether it starts on a change point, by a branch that was asked for."""
         return self._start_arc is not None
-
-    def _choose_start_branch(self) -> None:
-        """Start by the way of the next number where that is asked for and the start is a change point."""
-        if not (self.branches and self.point.regular_distance < AT_BIFURCATION_DISTANCE):
-            return
-        bifurcation = bifurcation_at_start(self.curve, self.point.y)
-        if bifurcation is None:
-            return
-        number = self.branches[0]
-        index = min(number, len(bifurcation.branches)) - 1
-        branch = bifurcation.branches[index]
-        arc = branch_crossing(self.curve, branch, bifurcation.rank_loss)
-        if arc is not None:
-            del self.branches[0]
-            self.point, self._start_arc = branch, arc._replace(before=branch)
-            self._note_passed(bifurcation, index, is_start=True, beyond=number > len(bifurcation.branches))
 
     def _note_passed(self, bifurcation: Bifurcation, index: int, is_start: bool, beyond: bool) -> None:
         u, direction = self.curve.inputs(bifurcation.y), self.curve.input_direction
         self.passed.append(PassedBifurcation(bifurcation, index, u, direction, is_start, beyond))
 
     def passed_until(self, last: float = np.inf) -> tuple[PassedBifurcation, ...]:
-        """The change points passed up to a place of the inputs on their way."""
+        """The change points passed up to a place of the inputs on their path."""
         return tuple(passed for passed in self.passed if passed.bifurcation.y[-1] <= last + END_TOLERANCE)
 
     @property
@@ -288,9 +283,10 @@ class CurveTracker:
         y = self.point.y if self.limit is None else np.append(self.point.y[:-1], self.limit)
         return self.curve.inputs(y), self.ending
 
-    def end_refusal(self, u: Array, point: CurvePoint, ending: TrackingEnd) -> NoAnswer:
-        """What to say of a motion along the curve that ends at inputs u, and went as far as a point."""
-        return cast(_EndReporter, self.curve.solver).end_refusal(u, point, ending)
+    def end_refusal(self) -> NoAnswer:
+        """Why the motion along the curve ends."""
+        u, ending = self.end_inputs
+        return cast(_EndReporter, self.curve.solver).end_refusal(u, self.point, ending)
 
     def _slide_extent(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""
@@ -337,26 +333,20 @@ class CurveTracker:
             distance = float(np.linalg.norm(near.y - point.y))
             if not float(point.tangent @ (near.y - point.y)) > 0.0 or distance > farthest:
                 continue
-            if near.residual > curve.solver.tolerance or not curve.is_closed(near.y):
+            if near.gap > curve.solver.tolerance or not curve.is_closed(near.y):
                 self.nearby = [other for other in self.nearby if np.linalg.norm(other.y - near.y) > 1e-6]
-                self.nearby.append(NearbyBifurcation(near.y, distance, near.residual))
+                self.nearby.append(NearbyBifurcation(near.y, distance, near.gap))
                 continue
             bifurcation = bifurcation_ahead(curve, point, near.y)
             if bifurcation is not None:
                 return bifurcation
         return None
 
-    def _update_nearby(self, after: CurvePoint) -> None:
-        """How near the walk comes to change points of neighbouring linkages."""
-        for k, near in enumerate(self.nearby):
-            distance = float(np.linalg.norm(after.y - near.y))
-            self.nearby[k] = near._replace(distance=min(near.distance, distance))
-
 
 def _input_limit(point: CurvePoint, slide: int) -> float | None:
     """The place to which the inputs tend as a slide goes out without an end; None where they go on with it.
 
-    Far out t = limit + c s^-k, of which the first and second derivative by s tell k and the rest of the way.
+    Far out t = limit + c s^-k, where k and the rest of the path follow from the first and second derivative by s.
     """
     s, s1, s2 = point.y[slide], point.tangent[slide], point.curvature[slide]
     t, t1, t2 = point.y[-1], point.tangent[-1], point.curvature[-1]
@@ -370,9 +360,9 @@ def _input_limit(point: CurvePoint, slide: int) -> float | None:
 
 
 def outgoing_branches(bifurcation: Bifurcation, point: CurvePoint) -> list[tuple[int, CurvePoint]]:
-    """The ways on from a change point with their numbers: the smooth one first, then by the angle from it.
+    """The branches on from a change point with their numbers: the smooth one first, then by the angle from it.
 
-    Of another way the direction in which the inputs go on as they came; both where they rest on it.
+    Of another branch the direction in which the inputs go on as they came; both where they rest on it.
     """
     smooth = bifurcation.branches[0].towards(point.tangent)
     options = [(0, smooth)]

@@ -1,11 +1,11 @@
-"""The sentences in which a mechanism that has no answer is refused.
+"""Why a mechanism has no answer: whether its motion is determined, and the sentences in which it is refused.
 
 What finds causes and remedies is loaded only when something is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import permutations
 from typing import TYPE_CHECKING
 
@@ -25,14 +25,71 @@ from planar.solving.checks.residual_check import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:
-    from planar.solving.diagnosis import redundancy
+    from planar.solving import full_constraints
 else:  # what finds causes is loaded only when something is refused
-    redundancy = LazyModule("planar.solving.diagnosis.redundancy")
+    full_constraints = LazyModule("planar.solving.full_constraints")
 
 MAX_BRANCHES_LISTED = 4
 """Branches that are listed one by one."""
 DISTINCT_RATE = 1e-3
 """Rates of an angle on two branches that tell them apart."""
+
+
+def judge_motion(setup: PreparedMechanism, z: Array, pair: str | None = None) -> NoAnswer | None:
+    """Why no motion of an input leads away from unknowns z (unknowns,); None where one may.
+
+    The causes are a structure, no input, and inputs of which `pair` (None: each) is held by the others. Dead points and
+    change points are not among them: motions lead away from these, and the run reports them. Counting motions takes
+    some milliseconds, so this is asked when a motion fails, or where the equations are not regular.
+    """
+    names = [driven.pair for driven in setup.mechanism.inputs]
+    links = [link.name for link in setup.mechanism.links if link.name != setup.mechanism.frame]
+    if setup.equations.open_rows:  # lengths that do not agree count as if they did
+        return None if names else always_free(setup, links)
+    w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p)
+    motions = full_constraints.count_motions(setup, w)
+    if motions == 0 or (motions is None and not names):
+        return structure(setup, w)
+    if not names:
+        return always_free(setup, links)
+    if motions is None or motions >= len(names):
+        return None
+    if any(full_constraints.can_move_alone(setup, w, name) for name in (names if pair is None else [pair])):
+        return None
+    return NoAnswer(
+        Outcome.TOO_MANY_INPUTS,
+        f"the mobility is {motions} {setup.describe_position()}, and {_inputs(setup)} are more"
+        f"{_inputs_to_leave_out(setup)}",
+    )
+
+
+def judge_velocity(setup: PreparedMechanism, z: Array) -> tuple[int, Callable[[], NoAnswer] | None]:
+    """The mobility at a position, and what computes the refusal where the inputs do not determine the velocity there or
+    contradict one another; None where they do determine it.
+
+    With one freedom more than inputs it is so to first order: the next orders decide.
+    """
+    s, rest = setup.inputs, np.zeros_like(z)
+    # the unknowns rest while the inputs move
+    y, y1, y2 = (np.concatenate(parts) for parts in ((z, s.u), (rest, s.u1), (rest, s.u2)))
+    motion = setup.functions.kinematics(y, y1, y2, s.p)
+    freedoms, weak = full_constraints.mobility_by_rank(setup, motion)
+    if not weak:
+        agrees = freedoms >= s.u.size or full_constraints.input_rates_agree(setup, motion)
+        return freedoms, None if agrees else lambda: disagreeing_inputs(setup, freedoms, "velocities")
+
+    def refuse() -> NoAnswer:
+        links = full_constraints.links_free_at_rest(setup, motion.jacobian)
+        links = links or list(dict.fromkeys(link for block in weak for link in block.links))
+        if freedoms <= s.u.size:
+            return dead_point(setup, links)
+        count = full_constraints.count_motions(setup, motion.w)
+        is_free = count is not None and count > s.u.size
+        if is_free or (count is None and any(full_constraints.is_always_singular(setup, block, z) for block in weak)):
+            return always_free(setup, links, motion.w)
+        return change_point(setup, links, freedoms, z)
+
+    return freedoms, refuse
 
 
 def free_links(setup: PreparedMechanism) -> NoAnswer:
@@ -129,7 +186,7 @@ def always_free(setup: PreparedMechanism, links: Sequence[str], w: Array | None 
 
 def jammed_inputs(setup: PreparedMechanism, w: Array | None = None) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free; w as for `always_free`."""
-    jam = redundancy.find_jammed_inputs(setup, w)
+    jam = full_constraints.find_jammed_inputs(setup, w)
     if jam is None:
         return None
     names, links = jam
@@ -159,7 +216,7 @@ def structure(setup: PreparedMechanism, w: Array) -> NoAnswer:
 def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     """What to remove from a structure: its inputs, or what lets it move."""
     mechanism = setup.mechanism
-    link, pairs = redundancy.releasing_parts(setup, w)
+    link, pairs = full_constraints.releasing_parts(setup, w)
     removal = f"pair{'s' * (len(pairs) != 1)} {quote_names(list(pairs))}" if pairs else "links or pairs"
     if link is not None:
         removal = f"link {link!r} with its {removal}"
@@ -168,26 +225,11 @@ def _structure_remedy(setup: PreparedMechanism, w: Array) -> str:
     return f"remove {_inputs(setup)}, or remove {removal} to let it move"
 
 
-def undriven(setup: PreparedMechanism) -> NoAnswer:
-    """A mechanism without inputs that can move although the count of its constraints gives no freedom."""
-    links = [link.name for link in setup.mechanism.links if link.name != setup.mechanism.frame]
-    return always_free(setup, links)
-
-
-def surplus_inputs(setup: PreparedMechanism, mobility: int) -> NoAnswer:
-    """More inputs than freedoms, so that none of those that move one another can run while the others stand still."""
-    return NoAnswer(
-        Outcome.TOO_MANY_INPUTS,
-        f"the mobility is {mobility} {setup.describe_position()}, and {_inputs(setup)} are more"
-        f"{_inputs_to_leave_out(setup)}",
-    )
-
-
-def change_point(setup: PreparedMechanism, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
-    """A position from which the mechanism may go on in several ways, and how one is chosen."""
+def change_point(setup: PreparedMechanism, links: Sequence[str], freedoms: int, z: Array) -> NoAnswer:
+    """A position from which the mechanism may go on by several branches, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
-        f"{setup.describe_position()} the mechanism has {count_phrase(mobility, 'freedom')} for "
+        f"{setup.describe_position()} the mechanism has {count_phrase(freedoms, 'freedom')} for "
         f"{count_phrase(len(setup.mechanism.inputs), 'input')}: {_links(links)} may move in more than one way from "
         f"here; move the input, or give a further input{_branch_choices(setup, z)}",
         **_all_links(links),
@@ -195,7 +237,7 @@ def change_point(setup: PreparedMechanism, links: Sequence[str], mobility: int, 
 
 
 def _branch_choices(setup: PreparedMechanism, z: Array) -> str:
-    """By which number a cycle goes on along which way, told by the link that moves most differently on them."""
+    """By which number a cycle goes on along which branch, described by the link that moves most differently on them."""
     if len(setup.mechanism.inputs) != 1 or not setup.has_extent:
         return ""
     from planar.solving.continuation.bifurcation import bifurcation_at_start
@@ -231,43 +273,28 @@ def dead_point(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
     )
 
 
-def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, ending: TrackingEnd) -> NoAnswer:
-    """Where a motion of the inputs ends: a dead point, the infinite, or branches that cannot be told apart."""
-    drive, outcome = _offered_pairs(setup, links, 4), Outcome.BRANCH_LOST
-    if ending is TrackingEnd.DEAD_POINT:
-        outcome = Outcome.DEAD_POINT
-        sentence = (
-            f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
-            f"stay short of it, go through the whole circuit, or drive {drive}"
-        )
-    elif ending is TrackingEnd.ENDLESS:
-        sentence = (
-            f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
-            f"where lines become parallel; stop short of it, or drive {drive}"
-        )
-    elif ending is TrackingEnd.OUT_OF_RANGE:
-        sentence = (
-            f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
-            f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
-            "file"
-        )
-    elif ending is TrackingEnd.INTERRUPTED:
-        outcome = Outcome.INTERRUPTED
-        sentence = (
-            f"this assembly was followed as far as {where}, when {time_is_over()}; go on from there, or give more time"
-        )
-    elif ending is TrackingEnd.WORK_LIMIT:
-        sentence = (
-            f"this assembly was followed as far as {where}, which took all the work that one answer may; stop there "
-            f"and go on from there, divide the range into more steps, or drive {drive}"
-        )
-    else:
-        motions = f"motions of {_links(links)} meet" if links else "motions meet"
-        sentence = (
-            f"this assembly can be followed only to {where}: there {motions} that cannot be told apart; stop short of "
-            f"it, or drive {drive}"
-        )
-    return NoAnswer(outcome, sentence)
+def motion_ended(setup: PreparedMechanism, rates: Sequence[Array], where: str, ending: TrackingEnd) -> NoAnswer:
+    """Where motions of the inputs end: a dead point, the infinite, or branches that cannot be told apart; each with the
+    rates of its unknowns there (unknowns,)."""
+    links = list(dict.fromkeys(link for of_motion in rates for link in full_constraints.moved_links(setup, of_motion)))
+    drive, moved = _offered_pairs(setup, links, 4), _links(links)
+    beyond = f"{_inputs(setup)} cannot go beyond {where}"
+    only, until = f"this assembly can be followed only to {where}", f"this assembly was followed as far as {where}"
+    motions = f"motions of {moved} meet" if links else "motions meet"
+    sentences = {
+        TrackingEnd.DEAD_POINT: f"{beyond}, a dead point: {moved} would lead back from there; stay short of it, "
+        f"go through the whole circuit, or drive {drive}",
+        TrackingEnd.ENDLESS: f"{beyond}: towards there {moved} slide out without an end, as where lines become "
+        f"parallel; stop short of it, or drive {drive}",
+        TrackingEnd.OUT_OF_RANGE: f"{only}: there {moved} are out by millions of times the mechanism's size; stop "
+        "short of it, or write the place that is wanted as the input's `position` in the file",
+        TrackingEnd.INTERRUPTED: f"{until}, when {time_is_over()}; go on from there, or give more time",
+        TrackingEnd.WORK_LIMIT: f"{until}, which took all the work that one answer may; stop there and go on from "
+        f"there, divide the range into more steps, or drive {drive}",
+    }
+    lost = f"{only}: there {motions} that cannot be told apart; stop short of it, or drive {drive}"
+    outcomes = {TrackingEnd.DEAD_POINT: Outcome.DEAD_POINT, TrackingEnd.INTERRUPTED: Outcome.INTERRUPTED}
+    return NoAnswer(outcomes.get(ending, Outcome.BRANCH_LOST), sentences.get(ending, lost))
 
 
 def motion_stopped(setup: PreparedMechanism, met: str, where: str) -> NoAnswer:
@@ -352,13 +379,13 @@ def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:
 
 def _surplus_inputs(setup: PreparedMechanism) -> str:
     """What to say of inputs that move one another while other links are free."""
-    sets = redundancy.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
+    sets = full_constraints.find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
     return f", and leave one out of those at {quote_names(sets[0])}, which move one another" if sets else ""
 
 
 def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     """Which inputs conflict, and what to do about it."""
-    sets = redundancy.find_conflicting_inputs(setup)
+    sets = full_constraints.find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
     clauses = [
@@ -371,11 +398,11 @@ def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     return f": {join_all_names(clauses)}; leave {which} out"
 
 
-def disagreeing_inputs(setup: PreparedMechanism, mobility: int, what: str) -> NoAnswer:
+def disagreeing_inputs(setup: PreparedMechanism, freedoms: int, what: str) -> NoAnswer:
     """Inputs whose positions agree but whose rates do not."""
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
-        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree{_inputs_to_leave_out(setup)}",
+        f"the mobility is {freedoms}, and the {what} of {_inputs(setup)} do not agree{_inputs_to_leave_out(setup)}",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,15 +14,14 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
 from planar.solving.checks.residual_check import EPS, MAX_RATE_ERROR, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import MIN_REGULARITY
-from planar.solving.continuation.run_samples import BranchRates, InputRates
+from planar.solving.continuation.fast_path import BranchRates, InputRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.regularity import regularity
 
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
 DIRECTION_TOLERANCE = 1e-9
-"""A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
+"""A part of the inputs' rates that is this much aside of the direction in which a change point was passed is none."""
 SMALLEST_NORMAL = float(np.finfo(float).tiny)
 MAX_ACCELERATION_ERROR = 0.1
 """Part of an acceleration that may be wrong."""
@@ -30,18 +29,11 @@ SHORT_ARM = 1e-4
 """Sizes: an arm that is shorter is named as a cause of what is lost."""
 
 
-class SampleRates(NamedTuple):
-    """w with its first, second and, where asked for, third rate at samples, each (samples, coordinates), and of which
-    samples the accuracy is in doubt."""
-
-    coordinate_rates: list[Array]
-    doubts: AccuracyDoubts | None
-
-
 def sample_rates(
     setup: PreparedMechanism, z: Array, inputs: InputRates, branch_rates: Mapping[int, BranchRates], with_jerk: bool
-) -> SampleRates:
-    """The rates at samples.
+) -> tuple[list[Array], AccuracyDoubts | None]:
+    """w with its first, second and, where asked for, third rate at samples, each (samples, coordinates), and of which
+    samples the accuracy is in doubt.
 
     NaN where none is determined: at dead points. At change points they are those of the branch that was followed.
     """
@@ -49,7 +41,7 @@ def sample_rates(
     y = np.hstack([z, inputs.u])
     at_rest = functions.kinematics(y, np.hstack([rest, inputs.u1]), np.hstack([rest, inputs.u2]), p)
     jacobians = at_rest.jacobian
-    strength = regularity(setup, jacobians).min(axis=-1, initial=1.0)
+    strength = setup.jacobian_regularity(jacobians).min(axis=-1, initial=1.0)
     # near by, the rates along a branch are those of a linkage that has the change point exactly
     known = {
         row: in_time
@@ -80,13 +72,13 @@ def sample_rates(
         part[~(is_regular | is_known)] = np.nan
     rows = np.flatnonzero(is_regular)
     if not rows.size:
-        return SampleRates(parts, None)
+        return parts, None
     doubts = find_accuracy_doubts(setup, jacobians[rows], motion.w[rows], y[rows], y1[rows], y2[rows])
-    return SampleRates(parts, doubts and doubts._replace(rows=rows[doubts.rows]))
+    return parts, doubts and doubts._replace(rows=rows[doubts.rows])
 
 
 def _rates_in_time(branch_rates: BranchRates, inputs: InputRates, index: int) -> Array | None:
-    """Rates in time (3, unknowns) from those along a way; None where the inputs do not run along it."""
+    """Rates in time (3, unknowns) from those along a direction; None where the inputs do not run along it."""
     direction, size = branch_rates.input_direction, float(branch_rates.input_direction @ branch_rates.input_direction)
     along = []
     for rate in (inputs.u1[index], inputs.u2[index], inputs.u3[index]):
@@ -99,53 +91,48 @@ def _rates_in_time(branch_rates: BranchRates, inputs: InputRates, index: int) ->
     return np.array([first * t1, first * t2 + second * t1**2, first * t3 + 3.0 * second * t1 * t2 + third * t1**3])
 
 
-class RateErrors(NamedTuple):
-    """Estimates of what round-off makes of samples, each (samples,).
+class AccuracyDoubts(NamedTuple):
+    """Samples whose accuracy is not sure: which, and what round-off makes of each (doubted,).
 
-    `places`: the greatest error of an angle (rad) or a length (sizes); `first`, `second`: of the velocities and the
-    accelerations, as a part of what moves in the same loop. Not numbers where none is known.
+    `position` is the greatest error of an angle (rad) or a length (sizes), `velocity` and `acceleration` those of the
+    rates as a part of what moves in the same loop; not numbers where none is known. `causes` are in words, with what
+    mends them.
     """
 
+    rows: IntArray
     position: Array
     velocity: Array
     acceleration: Array
+    causes: list[tuple[str, str]]
 
     @property
     def is_too_inexact(self) -> BoolArray:
-        """Which samples have too few digits left (samples,): next to a change point of places and velocities that are
-        known well the accelerations may be known to one."""
+        """Which have too few digits left: next to a change point of positions and velocities that are known well the
+        accelerations may be known to one."""
         return ~(
             (np.maximum(self.position, self.velocity) <= MAX_RATE_ERROR) & (self.acceleration <= MAX_ACCELERATION_ERROR)
         )
 
     @property
     def greatest(self) -> Array:
-        """The greatest of the three (samples,)."""
-        return np.maximum.reduce(self)
+        """The greatest of the three errors."""
+        return np.maximum.reduce(self[1:4])
 
-
-class AccuracyDoubts(NamedTuple):
-    """Samples whose accuracy is not sure: which (doubted,), by how much they are wrong at most, and a cause of each in
-    words, with what mends it."""
-
-    rows: IntArray
-    errors: RateErrors
-    causes: list[tuple[str, str]]
-
-    def remark(self, where: str = "") -> str:
-        """What there is to say of those that are accurate enough, at a place in words; nothing where there are none."""
-        exact = np.flatnonzero(~self.errors.is_too_inexact)
+    def remarks(self, describe: Callable[[int], str]) -> tuple[str, ...]:
+        """What there is to say of those that are accurate enough: of the worst, at the place of its row in words."""
+        exact = np.flatnonzero(~self.is_too_inexact)
         if not exact.size:
-            return ""
-        worst = int(exact[np.argmax(self.errors.greatest[exact])])
-        digits = max(int(-np.log10(self.errors.greatest[worst])), 1)
-        return f"rounding leaves {count_phrase(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}"
+            return ()
+        worst = int(exact[np.argmax(self.greatest[exact])])
+        digits = max(int(-np.log10(self.greatest[worst])), 1)
+        where = describe(int(self.rows[worst]))
+        return (f"rounding leaves {count_phrase(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}",)
 
     def refusal(self, setup: PreparedMechanism, k: int, where: str) -> NoAnswer:
         """What to say of the k-th of them, at a place in words."""
         cause, remedy = self.causes[k]
         what = "no digit of the accelerations"
-        for part, of in ((self.errors.velocity, "the rates"), (self.errors.position, "the position")):
+        for part, of in ((self.velocity, "the rates"), (self.position, "the position")):
             if not part[k] <= MAX_RATE_ERROR:
                 what = f"less than three digits of {of}"
         return NoAnswer(Outcome.TOO_INEXACT, f"{where} rounding leaves {what}, as {cause}; {remedy}")
@@ -154,9 +141,8 @@ class AccuracyDoubts(NamedTuple):
 def find_accuracy_doubts(
     setup: PreparedMechanism, jacobian: Array, w: Array, y: Array, y1: Array, y2: Array
 ) -> AccuracyDoubts | None:
-    """Which samples may be less accurate than they look; None where none is. Arguments as of `errors`, see there.
-
-    slope (samples, rows, unknowns), w (samples, coordinates) in sizes.
+    """Which samples may be less accurate than they look; None where none is. Arguments as of `rate_errors`, with the
+    Jacobian (samples, rows, unknowns) and w (samples, coordinates) in sizes.
     """
     amplification, stages, arms = _error_amplification(setup, jacobian)
     counted = np.maximum(np.abs(w).max(axis=1, initial=0.0) / np.pi, 1.0)
@@ -165,12 +151,13 @@ def find_accuracy_doubts(
     if not rows.size:
         return None
     errors = rate_errors(setup, y[rows], y1[rows], y2[rows])
-    is_exact = errors.greatest <= NEGLIGIBLE_ERROR
-    rows, errors = rows[~is_exact], RateErrors(*(error[~is_exact] for error in errors))
+    is_doubted = ~(errors.max(axis=0) <= NEGLIGIBLE_ERROR)
+    rows = rows[is_doubted]
     if not rows.size:
         return None
     causes = [_cause(setup, w[row], float(counted[row]), int(stages[row]), arms[row]) for row in rows]
-    return AccuracyDoubts(rows, errors, causes)
+    position, velocity, acceleration = errors[:, is_doubted]
+    return AccuracyDoubts(rows, position, velocity, acceleration, causes)
 
 
 def _error_amplification(setup: PreparedMechanism, jacobian: Array) -> tuple[Array, IntArray, Array]:
@@ -180,7 +167,7 @@ def _error_amplification(setup: PreparedMechanism, jacobian: Array) -> tuple[Arr
     singular; rates that are made of such angles lose as much once more.
     """
     greatest, which = np.ones(len(jacobian)), np.zeros(len(jacobian), dtype=int)
-    strong, arms = regularity(setup, jacobian), np.ones((len(jacobian), jacobian.shape[2]))
+    strong, arms = setup.jacobian_regularity(jacobian), np.ones((len(jacobian), jacobian.shape[2]))
     for index, stage in enumerate(setup.equations.blocks):
         block_jacobian = jacobian[:, stage.rows, stage.unknowns]
         if block_jacobian.shape[-1]:
@@ -214,8 +201,9 @@ def _cause(setup: PreparedMechanism, w: Array, counted: float, stage: int, arms:
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # what is not a number is not known
-def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
-    """What round-off makes of y = (z, u) and its rates, each (samples, y), with no more known than doubles hold.
+def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Array:
+    """What round-off makes of y = (z, u) and its rates, each (samples, y), with no more known than doubles hold: errors
+    (3, samples) as `AccuracyDoubts` has them.
 
     Every number of a row may be wrong by EPS of itself, and the row by what it leaves open. So much is the position
     wrong by the inverse of the slope (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM
@@ -245,7 +233,7 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
     dy2 = solved(lost2[:, :rows], EPS * np.abs(y2[:, unknowns:]))
     one, two = _reference_rates(setup, slope[:, :rows], np.abs(y1), np.abs(y2))
     errors = position_errors, _relative_errors(dy1, one), _relative_errors(dy2, two)
-    return RateErrors(*(np.max(error, axis=1, initial=0.0) for error in errors))
+    return np.array([np.max(error, axis=1, initial=0.0) for error in errors])
 
 
 def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:

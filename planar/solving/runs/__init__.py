@@ -1,1 +1,1 @@
-"""A whole motion: an input through its range, or all inputs in time."""
+"""Runs made into motions."""

@@ -16,11 +16,10 @@ from planar.foundation.errors import NoAnswer, join_names
 from planar.foundation.jets import TURN, value_and_rates
 from planar.model.mechanism import Drive, Mechanism, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.solving.continuation.path_pieces import PathPiece
+from planar.solving.continuation.path import PathPiece
 from planar.solving.continuation.solution_curve import Arc
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.prepared_mechanism import LazyFrames
-from planar.solving.rates.regularity import jacobian_at, regularity
 from planar.synthesis.judgement.defects import ONE_BRANCH, ONE_CIRCUIT, REACH, Defect
 from planar.synthesis.judgement.input_range import InputRange
 from planar.synthesis.task.synthesis_task import Wanted, WantedFunction, WantedPath
@@ -86,7 +85,7 @@ class DesignAssemblies:
 
     def condition(self, z: Array, position: float) -> float:
         """By how much more the assembly moves than its equations are out, lengths in units of the links' reach."""
-        least = regularity(self.solver, jacobian_at(self.solver, z, self._inputs(np.array([position]))[0]))
+        least = self.solver.block_regularity(z, self._inputs(np.array([position]))[0])
         return 1.0 / max(float(np.prod(least)), 1e-300)
 
     def _inputs(self, positions: Array) -> Array:
