@@ -3,16 +3,20 @@
 import atexit
 import gc
 import os
+import py_compile
 import re
 import signal
 import sys
 from collections import Counter
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import cache_from_source
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
 from tests.draws import EXHAUSTIVE_OPTION, EXHAUSTIVE_VARIABLE, is_exhaustive, load_profile
-from tests.repeated_cases import without_repeated
 
 for _limit in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_limit, "1")  # matrices are small, and on a busy machine threads wait for one another
@@ -27,6 +31,8 @@ sys.dont_write_bytecode = False
 
 load_profile()
 
+ROOT = Path(__file__).parents[1]
+
 
 def pytest_addoption(parser):
     """The option for all cases of tests of which a plain run takes some."""
@@ -39,6 +45,8 @@ def pytest_collection_modifyitems(config, items):
     asked = [argument for argument in config.args if "::" in argument]
     if is_exhaustive() or config.getoption("--repeated") or asked:
         return
+    from tests.repeated_cases import without_repeated  # loads numpy, for which the limits above are set first
+
     kept = without_repeated([item.nodeid for item in items])
     config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in kept])
     items[:] = [item for item in items if item.nodeid in kept]
@@ -70,10 +78,31 @@ def interruptions():
     signal.signal(signal.SIGINT, before)
 
 
+def import_test_modules(number: int, count: int) -> None:
+    """Import all modules of tests in one of so many workers that do so at once.
+
+    Each compiles its share of the modules of planar, and begins at another module of tests, so that it reads most of
+    what the others have compiled. In a fresh checkout the collection takes a third less than where each compiles all.
+    """
+    for path in sorted((ROOT / "planar").rglob("*.py"))[number::count]:
+        if not Path(cache_from_source(str(path))).exists():
+            py_compile.compile(str(path))
+    modules = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in sorted(ROOT.glob("tests/*/test_*.py"))
+    ]
+    first = len(modules) * number // count
+    for name in modules[first:] + modules[:first]:
+        with suppress(Exception, pytest.skip.Exception):  # which the collection reports
+            import_module(name)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session):
     """Tests are collected without looking for garbage, and what was made then is not looked through again."""
     gc.disable()
+    worker = getattr(session.config, "workerinput", None)
+    if worker and session.config.args == session.config.getini("testpaths"):
+        import_test_modules(int(worker["workerid"].removeprefix("gw")), worker["workercount"])
     try:
         return (yield)
     finally:

@@ -105,11 +105,11 @@ def test_what_does_not_hang_on_a_curve_cannot_be_assembled_all_the_same():
 
 
 def test_what_is_said_of_the_list_does_not_depend_on_how_far_it_was_read():
-    for certify, many, said in ((True, 5, "complete"), (True, 10, "numerically complete")):
-        modes = planar.modes(tower(many), certify=certify)
+    for many, said in ((5, "complete"), (9, "numerically complete")):  # up to 256 are certified for the claim
+        modes = planar.modes(tower(many))
         assert modes[0].certified
         assert modes.complete.value == said
-    long_list = planar.modes(tower(20), certify=False)
+    long_list = planar.modes(tower(13), certify=False)  # up to 4096 are solved for their number
     assert long_list[0].number == 1
-    assert len(long_list) == 2**20
+    assert len(long_list) == 2**13
     assert long_list.complete is Completeness.NUMERICALLY

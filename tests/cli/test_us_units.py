@@ -19,7 +19,9 @@ from planar.drawing.output.problem_sheets import answer_pages, problem_pages
 from planar.foundation.units import UnitError, parse_unit
 from planar.model.file_units import FileUnits
 from planar.pages.data.page_data import page_data
+from planar.reports.files.run_formats import encode_run
 from planar.reports.fitted_table import FittedTable
+from planar.reports.tables.forces.forces_over_motion import force_series
 from tests.command import run, written
 from tests.figures import visible_texts
 from tests.known import MODELS
@@ -157,16 +159,16 @@ def size_of(unit: str) -> float:
 
 
 def test_lists_have_no_metric_unit_in_their_heads_and_json_is_si(inches: str, tmp_path: Path) -> None:
-    for words in (["cycle", "--steps", "4", "--jerk"], ["forces", "--cycle", "--steps", "4"]):
-        run(tmp_path, words[0], inches, *words[1:], "-o", "list.csv").done()
-        heads = (tmp_path / "list.csv").read_text().splitlines()[0]
-        assert "[in/s^2]" in heads
-        assert not metric_words(heads)
-    clamp = written(tmp_path, planar.to_dict(replace(MODELS["toggle-clamp"], units=MODEL_IN_FEET)), "clamp.json")
-    run(tmp_path, "forces", clamp, "--cycle", "--steps", "4", "-o", "clamp.csv").done()
-    heads = (tmp_path / "clamp.csv").read_text().splitlines()[0]
-    assert "friction plunger heat [hp],without friction input O torque [ft lbf]" in heads
-    assert not metric_words(heads)
+    run(tmp_path, "cycle", inches, "--steps", "4", "--jerk", "-o", "list.csv").done()
+    clamp = replace(MODELS["toggle-clamp"], units=MODEL_IN_FEET)
+    lists = [(tmp_path / "list.csv").read_text()]
+    for mechanism in (planar.from_dict(INCHES), clamp):  # as the command writes them; its tables take long
+        motion = planar.cycle(mechanism, 4)
+        lists.append(encode_run(motion, ".csv", force_series(planar.forces(motion))).decode())
+    of_run, of_forces, of_clamp = (text.splitlines()[0] for text in lists)
+    assert "[in/s^2]" in of_run and "[in/s^2]" in of_forces
+    assert "friction plunger heat [hp],without friction input O torque [ft lbf]" in of_clamp
+    assert not any(metric_words(heads) for heads in (of_run, of_forces, of_clamp))
     found = json.loads(run(tmp_path, "solve", inches, "--json").done())
     state = planar.solve(planar.from_dict(INCHES))
     assert found["points"]["B"]["velocity"] == pytest.approx(state.point("B").velocity.tolist())

@@ -24,10 +24,11 @@ def test_a_scheme_to_scale_has_its_links_as_long_as_on_paper(tmp_path):
 
 
 def test_curves_are_cut_where_their_axes_end(tmp_path):
-    planar.plot.save(planar.plot.diagrams(planar.cycle("slider-crank", 36)), tmp_path / "d.dxf")
+    figure = planar.plot.diagrams(planar.cycle("slider-crank", 36))
+    planar.plot.save(figure, tmp_path / "d.dxf")
     document = ezdxf.readfile(tmp_path / "d.dxf")
     points = np.array([point[:2] for each in document.modelspace().query("LWPOLYLINE") for point in each])
-    width, height = 25.4 * planar.plot.diagrams(planar.cycle("slider-crank", 36)).get_size_inches()
+    width, height = 25.4 * figure.get_size_inches()
     assert points.min() >= -1.0
     assert np.all(points.max(axis=0) <= (width + 1.0, height + 1.0))
 

@@ -10,6 +10,7 @@ from PIL import Image
 
 import planar
 from planar import plot
+from planar.drawing.output import animation
 from tests.builders import four_bar_document
 from tests.command import run
 from tests.contact_sheet import DRAWINGS, MODELS, drawn
@@ -134,7 +135,9 @@ def test_a_dead_point_has_no_polygon_but_says_why(tmp_path):
     assert not (tmp_path / "a.png").exists()
 
 
-def test_a_moving_picture_comes_from_the_command(tmp_path):
+def test_a_moving_picture_comes_from_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "PIXELS_PER_MM", 1.0)
+    monkeypatch.setattr(animation, "DPI", 25.0)
     done = run(tmp_path, "animate", "four-bar", "--point", "E", "-o", "a.gif")
     assert (done.status, done.out, done.err) == (0, "", "")
     with Image.open(tmp_path / "a.gif") as picture:

@@ -21,7 +21,15 @@ TASK = {
     "start": "slider-crank",
     "wanted": [{"point": "E", "through": [[4 * k, 12 * (k % 5) - k * k / 4] for k in range(12)]}],
 }
-SEARCH = {"DRAWS": 100, "MATCHES": 4, "ROUNDS": 2, "GOOD": 0.0, "SETTLED": 99}
+SEARCH = {
+    "synthesise.DRAWS": 40,
+    "synthesise.MATCHES": 2,
+    "synthesise.ROUNDS": 2,
+    "synthesise.GOOD": 0.0,
+    "synthesise.SETTLED": 99,
+    "fitting.design_fit.MAX_STEPS": 5,
+}
+"""Numbers of modules in `planar.synthesis`, for a search in which no fit goes on to its end."""
 
 
 def measured():
@@ -135,7 +143,7 @@ PARTS = {
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     for name, value in SEARCH.items():
-        monkeypatch.setattr(f"planar.synthesis.synthesise.{name}", value)
+        monkeypatch.setattr(f"planar.synthesis.{name}", value)
     monkeypatch.setattr("planar.structures.linkage_store.BLOCK_SIZE", 5)
     monkeypatch.setattr("planar.batch.sweep_mechanisms.PART_SIZE", 2)
 

@@ -274,7 +274,7 @@ def test_more_than_can_be_met_exactly_is_refused_with_both_counts():
     ],
 )
 def test_a_refusal_names_the_demand_and_how_near_designs_come(few_designs, monkeypatch, demand, words):
-    monkeypatch.setattr("planar.synthesis.fitting.design_fit.MAX_STEPS", 30)  # how near they come does not matter
+    monkeypatch.setattr("planar.synthesis.fitting.design_fit.MAX_STEPS", 8)  # how near they come does not matter
     wanted = {"point": "E", "through": [[0, 0], [20, 12], [42, 15]], "in_order": True}
     found = planar.synthesise(task("slider-crank", wanted, demands=["whole turn", demand]), many=1)
     assert not len(found)

@@ -15,6 +15,7 @@ from planar.synthesis.families import FamilySearch, MemberSampler, independent_p
 from planar.synthesis.synthesis import least_transmission
 from planar.synthesis.task.starts import start_mechanisms
 from tests.builders import four_bar_document
+from tests.small_searches import set_small_searches
 
 LID = {
     "planar": 1,
@@ -130,7 +131,8 @@ def test_approximate_synthesis_lists_exact_designs_and_goes_on_from_its_folder(t
     assert again.remarks == found.remarks
 
 
-def test_a_family_without_a_design_says_what_is_in_the_way():
+def test_a_family_without_a_design_says_what_is_in_the_way(monkeypatch):
+    set_small_searches(monkeypatch)
     value = LID | {"within": {"AD.A": [-20, -19], "AD.D": [-20, -19]}, "demands": [{"transmission": 89}]}
     found = planar.synthesise(value, complete=True)
     assert not found and found.family.met == 0
@@ -153,8 +155,9 @@ def test_draws_by_closed_forms_are_exact():
         assert np.ptp(np.abs(designs.b - designs.c), axis=1).max(initial=0.0) < 1e-8
 
 
-def test_a_task_that_leaves_nothing_open_lists_each_linkage_once():
+def test_a_task_that_leaves_nothing_open_lists_each_linkage_once(monkeypatch):
     """The length of a rocker that stands at 120 deg with the crank at 60 deg: |D + r - B| = BC has two solutions."""
+    monkeypatch.setattr("planar.synthesis.synthesise.ROUNDS", 1)  # of catalogues, which find nothing else
     start = four_bar_document(50, 66, 56, 100, 60, omega="1 rad/s", units={"length": "mm", "angle": "deg"})
     apart = 0.1 - 0.05 * np.exp(1j * np.radians(60.0))
     along = (apart * np.exp(-1j * np.radians(120.0))).real

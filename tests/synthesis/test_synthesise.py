@@ -115,7 +115,7 @@ def test_demands_are_kept_or_the_one_in_the_way_is_named(monkeypatch):
         assert not any("dead point" in each.kind for each in motion.limits)
         assert np.ptp(motion.inputs["A"].position) == pytest.approx(2 * np.pi)
     inside = {"inside": [[-1, -1], [1, 1]]}
-    monkeypatch.setattr("planar.synthesis.fitting.design_fit.MAX_STEPS", 30)  # none keeps it, however near it comes
+    monkeypatch.setattr("planar.synthesis.fitting.design_fit.MAX_STEPS", 8)  # none keeps it, however near it comes
     none = planar.synthesise(task("four-bar", wanted, demands=[inside]), many=1)
     assert not len(none)
     assert none.rejected and any("leaves the region" in each for each in none.rejected[0].defects)

@@ -244,8 +244,9 @@ def moving_start(mechanism: Mechanism, free: FreeNumbers) -> Mechanism:
     turns = np.where(np.array(free.kinds) == "length", _size(free), 1.0)
     for spread in (None, *np.geomspace(0.02, 1.0, RANDOM_STARTS)):
         try:
-            changed = generic_start(mechanism, free)
-            if spread is not None:
+            if spread is None:
+                changed = generic_start(mechanism, free)
+            else:
                 values = np.clip(free.values + spread * turns * rng.normal(size=len(turns)), free.lower, free.upper)
                 changed = with_values(mechanism, dict(zip(free.names, values.tolist(), strict=True)))
                 if motion_kind(mechanism, drive.pair) == "angle":
