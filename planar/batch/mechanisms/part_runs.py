@@ -77,13 +77,13 @@ def _prepare_once(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPar
     if part is None or known != (request.pair, request.points):
         part = _prepare(mechanisms, request)
         cached["_prepared_part"] = (request.pair, request.points), part
-    return part  # type: ignore[no-any-return]
+    return part
 
 
 def _prepare(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
     pinned, linkages = _pinned_linkages(mechanisms, request.pair)
     is_open, start = np.ones(len(mechanisms), dtype=bool), np.zeros(len(mechanisms))
-    pins = pin_tape = assemblies = None
+    pins = pin_tape = None
     if linkages is not None:
         pins, pin_tape, start[pinned] = (
             result_pins(linkages, request.points),
