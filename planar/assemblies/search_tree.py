@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
-from planar.equations.placed_blocks import POLISHING_STEPS
+from planar.equations.block_type_functions import POLISHING_STEPS
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array

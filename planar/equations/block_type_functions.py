@@ -7,6 +7,7 @@ closed form. Those of known types are read, see `known_types`.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import cached_property, lru_cache
 from math import inf, isfinite, remainder
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,8 +17,8 @@ import numpy as np
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.block_types import MAX_BLOCK_TYPES, BlockTypeKey, block_equations
 from planar.equations.elements import known_text
-from planar.equations.placed_blocks import SETTLED_STEP, ClosedFormAssemblies, polish
-from planar.equations.structure_formulas import StructureFormulas
+from planar.equations.linear import solve_vectors
+from planar.equations.structure_formulas import BlockCall, StructureFormulas
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.jets import TURN
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 
 MAX_RUN_STEPS = 6
 """Steps of Newton's method at a position of a run."""
-
-
+POLISHING_STEPS = 2
+"""Newton's steps that carry a closed form to round-off."""
+SETTLED_STEP = 1e-9
+"""rad or sizes: after a shorter step of Newton's method the next one is round-off."""
 MAX_FORMULA_UNKNOWNS = 12
 """Unknowns of a block: the formula of the motion of a larger one would be too long."""
 
@@ -76,6 +79,86 @@ def derive_block_type(key: BlockTypeKey) -> BlockTypeFormulas:
         formulas.coordinate_function.formula,
         *closed_form_formula(equations, equations.blocks[0]),
     )
+
+
+def polish(
+    closing: BlockCall, z: Array, u: Array, p: Array, unknowns: slice = slice(None), steps: int = POLISHING_STEPS
+) -> None:
+    """Carry a block's unknowns in z (designs, unknowns) to round-off by Newton's method; `closing` gives its F and the
+    columns of its Jacobian."""
+    for _ in range(steps):
+        residuals, columns = closing.evaluate_batch(len(z), z, u, p)
+        with np.errstate(all="ignore"):  # what is not there is not a number
+            moves = solve_vectors(columns.swapaxes(-1, -2), residuals[:, 0])
+            z[:, unknowns] -= moves
+            if not (np.abs(moves) > SETTLED_STEP).any():
+                break
+
+
+BlockArguments = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
+"""z, u and p of the structure to what the functions of a block take."""
+
+
+class ClosedFormAssemblies:
+    """The two assemblies of one block in closed form, carried to round-off by Newton's steps.
+
+    `form` (z, u, p, sign) gives them, `closing` (z, u, p) the block's residuals and the columns of its Jacobian. Both
+    take what `arguments` gives; None where that is z, u and p themselves.
+    `has_changing_arm`: whether a length of the block turns on an arm that may vanish as the mechanism moves.
+    """
+
+    def __init__(
+        self,
+        unknowns: slice,
+        form: BlockCall,
+        closing: BlockCall,
+        has_changing_arm: bool,
+        arguments: BlockArguments | None = None,
+    ):
+        self._unknowns, self._form, self._closing = unknowns, form, closing
+        self.has_changing_arm, self._arguments = has_changing_arm, arguments
+
+    def placed(self, arguments: BlockArguments) -> ClosedFormAssemblies:
+        """The same of a block of this type in a structure."""
+        return ClosedFormAssemblies(self._unknowns, self._form, self._closing, self.has_changing_arm, arguments)
+
+    def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
+        """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
+
+        What is not there is not a number.
+        """
+        assemblies, residual, coalescence = self.of_designs(z[None], u, p)
+        return list(assemblies[:, 0]), float(residual[0]), float(coalescence[0])
+
+    def evaluate_batch(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
+        """Both (positions, unknowns), not polished, and how near they are to where they meet (positions,), at z
+        (positions, unknowns), u and p alike."""
+        return self._evaluate_form(*self._block_arguments(z, u, p))
+
+    def _block_arguments(self, z: Array, u: Array, p: Array) -> tuple[Array, Array, Array]:
+        return (z, u, p) if self._arguments is None else self._arguments(z, u, p)
+
+    def _evaluate_form(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
+        results = [self._form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
+        return [assembly[:, 0] for assembly, _ in results], results[0][1][:, 0, 0]
+
+    def of_designs(self, z: Array, u: Array, p: Array) -> tuple[Array, Array, Array]:
+        """The same of designs z (designs, unknowns), u and p alike: both (2, designs, unknowns of the block), the
+        greatest residuals and how near they are to where they meet (designs,)."""
+        z, u, p = self._block_arguments(z, u, p)
+        both, coalescence = self._evaluate_form(z, u, p)
+        greatest: Array = np.zeros(len(z))
+        assemblies: list[Array] = []
+        for assembly in both:
+            tried = z.copy()
+            tried[:, self._unknowns] = assembly
+            polish(self._closing, tried, u, p, self._unknowns)
+            residual = np.abs(self._closing.evaluate_batch(len(z), tried, u, p)[0][:, 0]).max(axis=1)
+            # the greatest of what is left open does not see what is not a number
+            is_defined = np.isfinite(tried[:, self._unknowns]).all(axis=1)
+            greatest = np.maximum(greatest, np.where(is_defined, residual, np.nan))
+            assemblies.append(tried[:, self._unknowns])
+        return np.array(assemblies), greatest, coalescence
 
 
 class BlockTypeFunctions:

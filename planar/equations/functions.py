@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations
-from planar.equations.block_type_functions import BlockTypeFunctions, block_type_functions
+from planar.equations.block_type_functions import (
+    BlockArguments,
+    BlockTypeFunctions,
+    ClosedFormAssemblies,
+    block_type_functions,
+)
 from planar.equations.block_types import PlacedBlock, place_blocks
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.placed_blocks import BlockCall, ClosedFormAssemblies, KnownCoordinates, PlacedBlockCall
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
-from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
+from planar.equations.structure_formulas import BlockCall, StructureFormulas
 from planar.equations.symbolic_equations import (
     Block,
     ConstraintEquations,
@@ -94,19 +99,15 @@ class EquationFunctions:
 
     def block_call(self, block: Block) -> BlockCall:
         """(z, u, p) -> F of this block (1, rows) and its Jacobian's columns in its own unknowns (unknowns, rows)."""
-        if block.block_index not in self._block_calls:
-            by_type = self._functions_of_type(block)
-            self._block_calls[block.block_index] = (
+        index = block.block_index
+        if index not in self._block_calls:
+            block_type = self._block_types[index]
+            self._block_calls[index] = (
                 self.formulas.block_call(block)
-                if by_type is None
-                else PlacedBlockCall(by_type.closing, self._known_coordinates.arguments_of(block))
+                if block_type is None
+                else _PlacedBlockCall(block_type.closing, self._known_coordinates.arguments_of(block))
             )
-        return self._block_calls[block.block_index]
-
-    def _functions_of_type(self, block: Block) -> BlockTypeFunctions | None:
-        """The functions of a block's type; None for one that has none."""
-        placed = self.placed_blocks[block.block_index]
-        return None if placed is None else block_type_functions(placed.key)
+        return self._block_calls[index]
 
     @cached_property
     def placed_blocks(self) -> tuple[PlacedBlock | None, ...]:
@@ -114,24 +115,30 @@ class EquationFunctions:
         return place_blocks(self.equations)
 
     @cached_property
-    def _known_coordinates(self) -> KnownCoordinates:
+    def _block_types(self) -> list[BlockTypeFunctions | None]:
+        """The functions of the types of all blocks."""
+        return [placed and block_type_functions(placed.key) for placed in self.placed_blocks]
+
+    @cached_property
+    def _known_coordinates(self) -> _KnownCoordinates:
         """Where blocks stand that are called by their types."""
-        types = map(self._functions_of_type, self.equations.blocks)
-        calls = [None if functions is None else functions.coordinates for functions in types]
         assert self.equations.assembled is not None
-        return KnownCoordinates(self.equations, self.equations.assembled, self.placed_blocks, calls)
+        return _KnownCoordinates(self.equations, self.equations.assembled, self.placed_blocks, self._block_types)
 
     def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         """Both assemblies of a block; None for one without a closed form."""
-        if block.block_index not in self._block_assemblies:
-            self._block_assemblies[block.block_index] = self._make_assemblies(block)
-        return self._block_assemblies[block.block_index]
+        index = block.block_index
+        if index not in self._block_assemblies:
+            block_type = self._block_types[index]
+            if block_type is None:
+                self._block_assemblies[index] = self._derive_assemblies(block)
+            else:
+                form = block_type.assemblies
+                self._block_assemblies[index] = form and form.placed(self._known_coordinates.arguments_of(block))
+        return self._block_assemblies[index]
 
-    def _make_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
-        by_type = self._functions_of_type(block)
-        if by_type is not None:
-            form = by_type.assemblies
-            return form and form.placed(self._known_coordinates.arguments_of(block))
+    def _derive_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+        """Both assemblies of a block without a type."""
         from planar.equations.closed_form import closed_form_formula  # nearly all blocks have a type
 
         e = self.equations
@@ -170,26 +177,6 @@ class EquationFunctions:
         input_jacobian: Array = both[..., slice(None), slice(self._unknown_count, None)]
         return SparseMatrices(of_unknowns, entries[..., : len(of_unknowns.rows)]), input_jacobian
 
-    def third_residual_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """The third time derivatives of F (samples, rows), from y and its first to third rates, of (samples, y)."""
-        return self.formulas.third_residual_rates(rates, p)
-
-    def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
-        """The same of w (samples, coordinates)."""
-        return self.formulas.third_coordinate_rates(rates, p)
-
-    def third_rate_remainder(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
-        """The third time derivative of F (rows,), that of y left out."""
-        return self.third_residual_rates((y[None], y1[None], y2[None], 0.0 * y[None]), p)[0]
-
-    def jacobian_changes(self, y: Array, directions: Array, p: Array) -> Array:
-        """How dF/dy (rows, y) at y (y,) changes along directions (k, y): (k, rows, y)."""
-        return self.formulas.jacobian_changes(y, directions, p)
-
-    def rounding_terms(self, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
-        """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""
-        return self.formulas.rounding_terms(y, y1, y2, p)
-
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         samples = np.atleast_2d(y)
@@ -222,10 +209,97 @@ class EquationFunctions:
         jacobian = SparseMatrices(evaluator.pattern, entries[0])
         return residuals[0], jacobian if self.is_sparse else np.asarray(jacobian)
 
-    @cached_property
+    @property
     def is_square(self) -> bool:
         """Whether every block has as many constraints as unknowns."""
         return self.equations.is_square
+
+
+class _PlacedBlockCall:
+    """A function of a block's type, called with z, u and p of the structure."""
+
+    def __init__(self, function: BlockCall, arguments: BlockArguments):
+        self._function, self._arguments = function, arguments
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """See `BlockCall`."""
+        return self._function(*self._arguments(*arguments))
+
+    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
+        """See `BlockCall`."""
+        return self._function.evaluate_batch(count, *self._arguments(*arguments))
+
+
+class _KnownCoordinates:
+    """(w, u) as far as blocks ahead of one give it. Of one position the last one is kept: from one block to the next,
+    or from one step of a block to the next, little changes."""
+
+    def __init__(
+        self,
+        e: ConstraintEquations,
+        assembled: AssembledEquations,
+        placed: tuple[PlacedBlock | None, ...],
+        block_types: Sequence[BlockTypeFunctions | None],
+    ):
+        self._equations, self._assembled, self._placed = e, assembled, placed
+        self._block_types = block_types
+        self._lock = Lock()
+        self._last: tuple[Array, Array, Array] | None = None
+        self._state: Array = np.zeros(0)
+        self._block_of_unknown = np.repeat(
+            np.arange(len(e.blocks)), [slice_length(block.unknowns) for block in e.blocks]
+        )
+
+    def coordinates_ahead(self, block_index: int, z: Array, u: Array, p: Array) -> Array:
+        """w (coordinates,) at one position; what follows from this block or a later one holds anything."""
+        with self._lock:
+            self._update(block_index, z, u, p)
+            return self._state[: len(self._equations.coordinates)].copy()
+
+    def arguments_of(self, block: Block) -> BlockArguments:
+        """z, u and p to what the functions of a block's type take: its unknowns, what it rests on of (w, u), and its
+        numbers."""
+        return partial(self._arguments, block)
+
+    def _arguments(self, block: Block, z: Array, u: Array, p: Array) -> tuple[Array, Array, Array]:
+        placed = self._placed[block.block_index]
+        assert placed is not None
+        numbers = p[..., placed.numbers]
+        if z.ndim == 1:
+            with self._lock:
+                self._update(block.block_index, z, u, p)
+                return z[block.unknowns], self._state[placed.known], numbers
+        unknowns = z[:, block.unknowns]
+        if u.ndim == p.ndim == 1 and bool((z[:, : block.unknowns.start] == z[0, : block.unknowns.start]).all()):
+            return unknowns, self._arguments(block, z[0], u, p)[1], numbers
+        inputs = np.broadcast_to(u, (len(z), u.shape[-1]))
+        return unknowns, np.hstack([self._assembled.coordinates(z, inputs, p), inputs])[:, placed.known], numbers
+
+    def _update(self, block_index: int, z: Array, u: Array, p: Array) -> None:
+        """Bring the state to a position, as far as the block."""
+        count = len(self._equations.coordinates)
+        if self._last is None or not (np.array_equal(u, self._last[1]) and np.array_equal(p, self._last[2])):
+            self._state = np.concatenate([self._assembled.coordinates(z[None], u[None], p)[0], u])
+            self._last = z.copy(), u.copy(), p.copy()
+            return
+        previous = self._last[0]
+        start = self._equations.blocks[block_index].unknowns.start if block_index < len(self._placed) else len(z)
+        changed = np.flatnonzero(z[:start] != previous[:start])
+        if not len(changed):
+            return
+        first = int(self._block_of_unknown[changed[0]])
+        for block in self._equations.blocks[first:block_index]:
+            placed, block_type = self._placed[block.block_index], self._block_types[block.block_index]
+            if placed is None or block_type is None:
+                self._state[:count] = self._assembled.coordinates(z[None], u[None], p)[0]
+                previous[:] = z
+                return
+            unknowns = z[block.unknowns]
+            known, numbers = self._state[placed.known], p[placed.numbers]
+            self._state[placed.coordinates] = block_type.coordinates(unknowns, known, numbers)[0][0]
+        # blocks behind are computed again when they are asked for
+        previous[:start] = z[:start]
+        previous[start:] = np.nan
 
 
 def equation_functions(mechanism: Mechanism) -> EquationFunctions:

@@ -13,10 +13,9 @@ import numpy as np
 
 from planar.equations.block_motion import DIFFERENCE_STEP
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
-from planar.equations.placed_blocks import BlockCall
 from planar.equations.residuals import ConstraintRow
 from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
-from planar.equations.structure_formulas import RoundingTerms, StructureFormulas
+from planar.equations.structure_formulas import BlockCall, RoundingTerms, StructureFormulas
 from planar.equations.symbolic_equations import Block, ConstraintEquations, ConstraintExpressions
 from planar.foundation.arrays import Array
 from planar.foundation.lazy_module import LazyModule
@@ -104,7 +103,7 @@ def with_rank_conditions(functions: EquationFunctions, parts: Mapping[int, LowRa
         make_expressions=lambda: _conditioned_expressions(e, in_order, order),
         elimination=None,
     )
-    return EquationFunctions(conditioned, ConditionedEquations(conditioned, functions.formulas, in_order, order))
+    return EquationFunctions(conditioned, ConditionedEquations(functions.formulas, in_order, order))
 
 
 def _conditioned_expressions(
@@ -139,19 +138,12 @@ class ConditionedEquations(StructureFormulas):
     where a part has the constraints of earlier blocks.
     """
 
-    def __init__(
-        self, equations: ConstraintEquations, base: StructureFormulas, parts: Sequence[LowRankBlock], order: list[int]
-    ):
+    def __init__(self, base: StructureFormulas, parts: Sequence[LowRankBlock], order: list[int]):
         vars(self).update(vars(base))  # coordinates are the same
-        self._equations, self._base, self._parts, self._order = equations, base, parts, order
+        self._base, self._parts, self._order = base, parts, order
         rows, columns = len(order), base.pattern.shape[1]
         first = rows * np.arange(columns + 1)
         self.pattern = SparsePattern((rows, columns), np.tile(np.arange(rows), columns), first)
-
-    @property
-    def recorded(self) -> StructureFormulas:
-        """The same as formulas that can be printed."""
-        return StructureFormulas(self._equations)
 
     def _conditions(self, jacobians: Array) -> Array:
         """The conditions and their rates (orders, samples, conditions), from those of J (orders, samples, rows, y)."""

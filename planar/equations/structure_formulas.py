@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from planar.codegen.printed_formula import FormulaFunction
 from planar.equations.assembled_equations import AssembledEquations
-from planar.equations.placed_blocks import BlockCall
 from planar.equations.sparse_matrices import SparsePattern
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
@@ -27,6 +26,17 @@ from planar.foundation.recorded_formula import (
     number_of,
     recorded_arguments,
 )
+
+
+class BlockCall(Protocol):
+    """A function (z, u, p) of dense columns, as a block's F and the columns of its Jacobian, at one position or
+    many."""
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """The results (columns, rows)."""
+
+    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
+        """The results (positions, columns, rows); arguments (positions, entries), or (entries,) for all alike."""
 
 
 def _record_elements(assembled: AssembledEquations, counts: Sequence[int]) -> tuple[RecordedFormula, RecordedFormula]:
@@ -87,11 +97,6 @@ class StructureFormulas:
         self._y_count = self.pattern.shape[1]
         self.unknown_count = self._counts[0]
         self._rate_functions: dict[tuple[str, int], FormulaFunction] = {}
-
-    @property
-    def recorded(self) -> StructureFormulas:
-        """The same as formulas that can be printed."""
-        return self
 
     @cached_property
     def _residuals(self) -> RecordedFormula:
@@ -159,6 +164,10 @@ class StructureFormulas:
         """The third time derivatives of F (samples, rows), from y and its first to third rates, of (samples, y)."""
         return self._rates("F", self._residuals, rates, p)
 
+    def third_rate_remainder(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
+        """The third time derivative of F (rows,), that of y left out."""
+        return self.third_residual_rates((y[None], y1[None], y2[None], 0.0 * y[None]), p)[0]
+
     def third_coordinate_rates(self, rates: Sequence[Array], p: Array) -> Array:
         """The same of w (samples, coordinates)."""
         return self._rates("w", self._coordinates, rates, p)
@@ -208,7 +217,7 @@ class StructureFormulas:
         return self.block_function(block)
 
     def block_function(self, block: Block) -> FormulaFunction:
-        """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its own unknowns (unknowns, rows)."""
+        """(z, u, p) -> F of a block (1, rows), and the columns of its Jacobian in its unknowns (unknowns, rows)."""
         rows, unknowns = slice_length(block.rows), slice_length(block.unknowns)
         residuals = self._closing.results[block.rows]
         formula = self._with_dense_entries(self._closing, residuals, block.rows, block.unknowns)

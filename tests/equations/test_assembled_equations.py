@@ -157,13 +157,18 @@ def test_what_is_carried_out_on_jets_is_what_casadi_derives(stem):
     sizes = ca.mtimes(ca.fabs(ca.jacobian(both, e.p)), ca.fabs(e.p)) + ca.mtimes(ca.fabs(slopes[0]), ca.fabs(e.y))
     derived = ca.Function("derived", [e.y, *symbols, e.p], [rates[2], sizes, *slopes])
     rates_of_y = y, y1, y2, y3
-    third = np.hstack([functions.third_residual_rates(rates_of_y, p), functions.third_coordinate_rates(rates_of_y, p)])
-    terms = functions.rounding_terms(y, y1, y2, p)
+    third = np.hstack(
+        [
+            functions.formulas.third_residual_rates(rates_of_y, p),
+            functions.formulas.third_coordinate_rates(rates_of_y, p),
+        ]
+    )
+    terms = functions.formulas.rounding_terms(y, y1, y2, p)
     for k in range(len(y)):
         expected = [each.full() for each in derived(y[k], y1[k], y2[k], y3[k], p)]
         for values, of_casadi in zip((third[k], terms.term_sum[k]), expected, strict=False):
             np.testing.assert_allclose(values, of_casadi[:, 0], rtol=1e-9, atol=1e-9 * (1.0 + np.abs(of_casadi).max()))
         for values, of_casadi in zip(terms[2:], expected[2:], strict=True):
             np.testing.assert_allclose(values[k], of_casadi, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(of_casadi).max()))
-        change = functions.jacobian_changes(y[k], y1[k : k + 1], p)[0]
+        change = functions.formulas.jacobian_changes(y[k], y1[k : k + 1], p)[0]
         np.testing.assert_allclose(change, expected[3][: len(change)], rtol=1e-9, atol=1e-9)

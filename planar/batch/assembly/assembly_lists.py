@@ -12,8 +12,8 @@ from planar.assemblies.modes import modes
 from planar.assemblies.search_tree import is_linear
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.reference_design import ReferenceDesign
+from planar.equations.block_type_functions import POLISHING_STEPS
 from planar.equations.linear import solve_vectors
-from planar.equations.placed_blocks import POLISHING_STEPS
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.link_shapes import PointPlacementError

@@ -14,6 +14,7 @@ from planar.assemblies.modes import Mode, modes
 from planar.document.dimensions import Dimension, change_dimension
 from planar.drawing.scheme.link_bodies import outline_point_names
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
+from planar.equations.structure_formulas import StructureFormulas
 from planar.equations.symbolic_equations import slice_length
 from planar.foundation.time_limit import stop_if_over
 from planar.model.link_graph import link_numbers
@@ -166,7 +167,7 @@ def _computed_page_data(mechanism: Mechanism, z: np.ndarray | None) -> tuple[dic
     stop_if_over("before the forces of the page were set up")
     acting = force_data(numbers, mechanism, state, solver.unit)
     data["forces"] = acting and acting[0]
-    formulas = program.formulas.recorded
+    formulas = StructureFormulas(program.equations)
     functions = [
         numbers.to_javascript(),
         drawing.to_javascript(),

@@ -213,7 +213,7 @@ class _BranchConditions:
 
         def third_order(e: Array) -> Array:
             second = curve.widen_direction(base + self.null @ (across @ e)) + aside
-            return self.left_null.T @ curve.functions.third_rate_remainder(position, ahead, second, curve.p)
+            return self.left_null.T @ curve.functions.formulas.third_rate_remainder(position, ahead, second, curve.p)
 
         e = solve_third_order(third_order, across.shape[1])
         return None if e is None else CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)

@@ -26,9 +26,9 @@ from planar.equations.acceptance import (
     JudgedPositions,
     Scales,
 )
+from planar.equations.block_type_functions import SETTLED_STEP
 from planar.equations.constraint_check import ORDERS
 from planar.equations.functions import MAX_CACHED_STRUCTURES
-from planar.equations.placed_blocks import SETTLED_STEP
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.recorded_formula import formula_of_results, greatest_entries, number_of, recorded_arguments

@@ -224,7 +224,7 @@ class SolutionCurve(ImplicitCurve):
         (n + 1, k): (sums, k, n + 1); of many unknowns by differences of the Jacobian."""
         if not self.functions.is_sparse:
             wide = np.array([self.widen_direction(direction) for direction in directions.T])
-            changes = self.functions.jacobian_changes(self.unknowns_and_inputs(y), wide, self.p)
+            changes = self.functions.formulas.jacobian_changes(self.unknowns_and_inputs(y), wide, self.p)
             of_inputs = changes.shape[2] - len(self.input_direction)
             along = changes[..., of_inputs:] @ self.input_direction[:, None]
             return (weights.T @ np.concatenate([changes[..., :of_inputs], along], axis=2)).swapaxes(0, 1)

@@ -66,8 +66,8 @@ def sample_rates(
     motion = functions.kinematics(y, y1, y2, p)
     parts = [motion.w, motion.w1, motion.w2]
     if with_jerk:
-        z3 = solved(functions.third_residual_rates((y, y1, y2, np.hstack([rest, inputs.u3])), p), 3)
-        parts.append(functions.third_coordinate_rates((y, y1, y2, np.hstack([z3, inputs.u3])), p))
+        z3 = solved(functions.formulas.third_residual_rates((y, y1, y2, np.hstack([rest, inputs.u3])), p), 3)
+        parts.append(functions.formulas.third_coordinate_rates((y, y1, y2, np.hstack([z3, inputs.u3])), p))
     for part in parts[1:]:
         part[~(is_regular | is_known)] = np.nan
     rows = np.flatnonzero(is_regular)
@@ -211,7 +211,7 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Arr
     """
     e = setup.equations
     rows, unknowns = len(e.rows), len(e.unknowns)
-    terms = setup.functions.rounding_terms(y, y1, y2, setup.inputs.p)
+    terms = setup.functions.formulas.rounding_terms(y, y1, y2, setup.inputs.p)
     slope, first, second = (
         np.abs(jacobian) for jacobian in (terms.jacobian, terms.first_rate_jacobian, terms.second_rate_jacobian)
     )
