@@ -82,8 +82,6 @@ class LateSentences(Sequence[str]):
         return tuple, (self._all(),)
 
 
-PLAIN_NUMBERS = frozenset({float, int, np.float64})
-"""Types of values that are surely one number."""
 NO_REMARKS: Sequence[str] = ()
 
 
@@ -249,8 +247,9 @@ class PreparedSweep:
     @staticmethod
     def _read_values(values: Mapping[str, float] | None) -> Mapping[str, float]:
         values = {} if values is None else values
-        if not PLAIN_NUMBERS.issuperset(map(type, values.values())):
-            values = {name: _check_number(name, value) for name, value in values.items()}
+        for value in values.values():
+            if type(value) is not float:
+                return {name: _check_number(name, value) for name, value in values.items()}
         return values
 
     def sweep(self, designs: Mapping[str, Any]) -> Sweep:

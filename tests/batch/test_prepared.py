@@ -43,6 +43,24 @@ def test_dimensions_change_from_run_to_run():
     agree(ready(), planar.sweep(mechanism, {name: [value]}, 60), ready.points)
 
 
+def test_parts_of_a_result_that_are_kept_stay_as_they_are():
+    mechanism = MODELS["crank-rocker"]
+    ready = planar.prepared(mechanism, 60)
+    name = next(name for name in design_variables(mechanism) if name.endswith(".length"))
+    value, point = design_variables(mechanism)[name].value, ready.points[-1]
+    designs = [{name: (1.0 + 1e-4 * k) * value} for k in range(50)]
+    # an array, a column of one, a buffer and a result, of which the rest is let go
+    kept = [(k, ready(design).velocity[point]) for k, design in enumerate(designs)]
+    columns = [ready(design).velocity[point][:, 0] for design in designs]
+    buffers = [memoryview(ready(design).velocity[point]) for design in designs]
+    orders = [ready(design).velocity for design in designs]
+    for k, array in kept:
+        swept = planar.sweep(mechanism, {name: [designs[k][name]]}, 60, point).velocity[point][0]
+        for same in (array, np.asarray(buffers[k]), orders[k][point]):
+            np.testing.assert_allclose(same, swept, rtol=0.0, atol=1e-9 * np.abs(swept).max())
+        np.testing.assert_array_equal(columns[k], array[:, 0])
+
+
 def test_a_design_that_stops_says_so():
     mechanism = MODELS["crank-rocker"]
     ready = planar.prepared(mechanism, 60)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from math import ceil
-from typing import Any, NamedTuple
+from math import ceil, prod
+from sys import getrefcount
+from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -22,7 +24,7 @@ from planar.batch.march.kernel_writer import OperandNames, write_angle_sum
 from planar.batch.prepare.design_numbers import DesignNumbers, compiled_variables
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import check_length
-from planar.codegen.llvm_compile import WIDEST_VECTOR_BYTES, compile_function
+from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.equations.generic_evaluation import inline_function
 from planar.foundation.arrays import Array, IntArray
@@ -46,6 +48,8 @@ REASONABLE_SIZES = (1e-99, 1e99)
 """Magnitudes of given values that are not zero; the general path refuses or solves others."""
 
 LANES = 16
+T = TypeVar("T")
+
 RUN_FUNCTION, NUMBERS_STAGE = "run", "numbers"
 RUN_ARGUMENTS = "ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out, ptr %weights"
 """The constants of a run, eight bytes each, see `RunStages`; how many values are given, and the place of each among
@@ -69,6 +73,8 @@ LEAST_STEPS = 128
 """Minimum steps of a run: each lane of a block that Newton's method solves takes some of them."""
 FINE_STEP = 0.1
 """rad or sizes: longer steps of the input are divided."""
+MAX_KEPT_BYTES = 8_000_000
+"""Memory for results that a compiled run keeps."""
 
 
 class RunStages(NamedTuple):
@@ -110,9 +116,55 @@ class CompiledRun:
         self.context = self._context.ctypes.data
         self.shape = 1 + stages.row_count + more_rows, stages.constants["blocks"] * LANES
         self.scratch_size = stages.scratch_size
+        self._scratch: deque[Array] = deque()
+        self._outputs: deque[Output] = deque()
+        self._max_outputs = max(1, MAX_KEPT_BYTES // (8 * prod(self.shape)))
         self.results: Any = slice(1, 1 + stages.result_count), slice(wanted.start, wanted.stop, wanted.step)
         if more_rows:
             self.results = slice(1 + stages.row_count, None)
+
+    def __call__(self, places: int, values: bytes, weights: int) -> Array:
+        """The rows of one design, see `RUN_ARGUMENTS`.
+
+        The memory of an earlier result that nobody refers to is used again: new pages cost more than a run.
+        """
+        output = _take_kept(self._outputs, self._make_output)
+        if getrefcount(output.rows) > UNUSED_REFERENCES:
+            self._outputs.append(output)
+            output = self._make_output()
+        if self.scratch_size:
+            scratch = _take_kept(self._scratch, lambda: allocate_aligned(1, 1, self.scratch_size))
+            self.function(self.context, places, values, address_of(scratch), output.address, weights)
+            self._scratch.append(scratch)
+        else:
+            self.function(self.context, places, values, 0, output.address, weights)
+        if len(self._outputs) < self._max_outputs:
+            self._outputs.append(output)
+        return output.rows
+
+    def _make_output(self) -> Output:
+        rows = np.empty(self.shape)
+        return Output(rows, rows.ctypes.data)
+
+
+def _take_kept(kept: deque[T], make: Callable[[], T]) -> T:
+    """One of the kept, no longer kept, or a new one; another thread may take the last one at any time."""
+    try:
+        return kept.popleft()
+    except IndexError:
+        return make()
+
+
+class Output(NamedTuple):
+    """Rows that a run writes, and their address."""
+
+    rows: Array
+    address: int
+
+
+_unused = Output(np.empty(0), 0)
+UNUSED_REFERENCES = getrefcount(_unused.rows)
+"""References to rows that no result shares."""
 
 
 def _eight_bytes(value: Any) -> int:
@@ -360,12 +412,7 @@ class CompiledRuns:
             packed = pack(*values.values())
         except (struct.error, TypeError):  # the general path says in words what is not a number
             return None
-        out, scratch = np.empty(run.shape), 0
-        if run.scratch_size:
-            memory = np.empty(run.scratch_size + WIDEST_VECTOR_BYTES // 8)
-            scratch = address_of(memory)
-            scratch += -scratch % WIDEST_VECTOR_BYTES
-        run.function(run.context, places, packed, scratch, address_of(out), weights)
+        out = run(places, packed, weights)
         ending = out.item(0)
         if ending == UNSURE or (self.can_misfit and not self._is_fit(values)):
             return None
