@@ -250,7 +250,8 @@ class SolutionCurve(ImplicitCurve):
         if len(y) == 1:
             return np.inf
         sizes = column_norms(jacobian, MIN_COLUMN_NORM)
-        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - jacobian) / (sizes * DIFFERENCE_STEP)
+        ahead = np.asarray(self.jacobian(y + DIFFERENCE_STEP * tangent))
+        change = (ahead - jacobian) / (sizes * DIFFERENCE_STEP)
         distance = float(singular_distance(least_value, np.linalg.norm(change)))
         if distance >= SHORT_REGULAR_DISTANCE or least_value < ZERO_SINGULAR_VALUE:
             return distance
