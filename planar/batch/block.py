@@ -9,13 +9,15 @@ import numpy as np
 
 from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
-from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
+from planar.batch.design_arrays import design_variables, split_into_blocks, values_of_design, with_design_values
 from planar.batch.design_stops import STEPS_BEYOND_STOP, find_input_stops, watch_stops
 from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
 from planar.batch.march.runs import lead_designs, run_designs
 from planar.batch.march.stops import SAME_END
+from planar.batch.mechanisms.linkages import SweepRequest
+from planar.batch.mechanisms.part_runs import solve_part
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.llvm_compile import allocate_aligned
 from planar.foundation.errors import NoAnswer, Outcome
@@ -28,9 +30,13 @@ Array = np.ndarray
 
 LEAD_IN_STEP = 0.03
 """rad or sizes a step on the way to where the run starts."""
+MAX_TAPED_DESIGNS = 256
+"""Designs that are solved block after block at once."""
 RUN_ALL_RATIO = 0.3
 """Where more than this part of the designs can be run, all are: those that cannot cost less than a copy of the rest."""
 FULL_TURN = 2.0 * np.pi
+MAX_JOINED_LINKS = 60
+"""Links of mechanisms whose equations are compiled together: larger ones are solved block after block."""
 
 
 class DesignBlock(NamedTuple):
@@ -187,16 +193,17 @@ class DesignBlockSolver:
             int(number): (int(count), self._question(int(early[first]), inputs))
             for number, first, count in zip(*np.unique(code[early], return_index=True, return_counts=True), strict=True)
         }
-        for index in rest:
+        left = self._solve_by_blocks(rest, out)
+        for index in left:
             self._solve_alone(index, out, status, inputs)
-        counts = self.general_positions, len(rest) + self.followed_designs
+        counts = self.general_positions, len(left) + self.followed_designs
         endings = tuple((number, *ending) for number, ending in self.endings.items())
         return SolvedDesigns(out, status, inputs, *counts, endings, *self.ends)
 
     def _can_be_compiled(self) -> bool:
         """Whether designs may run compiled, as far as the mechanism and the range tell."""
         reference, block = self.reference, self.block
-        if not reference.can_be_compiled:
+        if not reference.can_be_compiled or len(reference.mechanism.links) > MAX_JOINED_LINKS:
             return False
         if block.duration is not None:
             return not reference.mechanism.stops
@@ -226,6 +233,24 @@ class DesignBlockSolver:
         grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
         return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends, block.duration)
+
+    def _solve_by_blocks(self, designs: list[int], out: Array) -> list[int]:
+        """Solve designs as `sweep_each` does, whose functions are compiled for types of blocks; the designs that are
+        left: those that it does not decide, or that do not come to the end."""
+        block = self.block
+        has_common_range = self.has_common_length and not self.has_own_range
+        if block.duration is not None or block.start is not None or self.reference.is_sliding or not has_common_range:
+            return designs
+        request = SweepRequest(block.steps, block.points, block.rates, block.pair, float(self.range_length[0]))
+        left: list[int] = []
+        for part in split_into_blocks(len(designs), MAX_TAPED_DESIGNS):
+            indices = designs[part]
+            solved = solve_part([block.single_design(k) for k in indices], request, uses_general_path=False)
+            is_whole, steps = solved.endings.solved > block.steps, block.steps + 1
+            rows = solved.values[:, :, :steps].reshape(len(indices), len(block.points), -1, 2, steps)[is_whole]
+            out[:, :, np.array(indices)[is_whole]] = rows.transpose(4, 2, 1, 3, 0).reshape(*out.shape[:2], len(rows))
+            left += [k for k, is_solved in zip(indices, is_whole.tolist(), strict=True) if not is_solved]
+        return left
 
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""

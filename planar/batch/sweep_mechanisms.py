@@ -34,6 +34,7 @@ from planar.document.first_argument import MechanismSource
 from planar.foundation.arrays import Array, part_offsets
 from planar.foundation.errors import BadInput
 from planar.foundation.time_limit import interrupted, report_progress, returns_part_in_time, time_is_over
+from planar.model.link_shapes import PointName
 from planar.model.mechanism import Mechanism, running_input_index
 from planar.model.pin_linkage import PinnedMechanism
 from planar.model.pin_linkages import PinnedLinkages
@@ -43,7 +44,7 @@ from planar.model.wording import count_phrase
 PART_SIZE = 512
 """Number of mechanisms that a thread or an executor solves together."""
 Part = list[Mechanism] | PinnedLinkages
-_SolvedPart = tuple[SweptPart | ReducedBlock, int, set[str]]
+_SolvedPart = tuple[SweptPart | ReducedBlock, int, set[PointName]]
 
 
 @overload

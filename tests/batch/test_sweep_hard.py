@@ -5,13 +5,15 @@ import numpy as np
 import pytest
 
 import planar
+from planar.batch import block
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.march import kernel
 from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, Outcome
-from tests.builders import bar_linkage, bare_four_bar, four_bar_document
+from tests.builders import bar_linkage, bare_four_bar, designs_around, four_bar_document
 from tests.draws import first_cases, part
+from tests.known import MODELS
 from tests.linkages import random_linkage
 
 
@@ -256,3 +258,47 @@ def test_an_arm_too_short_for_its_offset_between_two_steps_is_not_passed_over(st
     swept = planar.sweep(planar.from_dict(value), values, steps, "A", rates=False)
     turned = -np.arccos((crank**2 + 1.0 - offset**2) / (2.0 * crank)) - start
     np.testing.assert_allclose(swept.dead_point - start, turned, atol=1e-8)
+
+
+def test_many_links_are_solved_block_after_block():
+    # parallelograms, each driven by the rocker of the one before
+    cells, angle = 32, 1.0
+    pins = {f"P{k}": [k + 0.5 * np.cos(angle), 0.5 * np.sin(angle)] for k in range(cells + 1)}
+    frame = {f"G{k}": [k, 0] for k in range(cells + 1)}
+    bars = {f"R{k}": (f"G{k}", f"P{k}", 0.5) for k in range(cells + 1)}
+    bars |= {f"C{k}": (f"P{k - 1}", f"P{k}", 1.0) for k in range(1, cells + 1)}
+    mechanism = bar_linkage(frame, bars, ("G0", angle), pins)
+    designs = {"C32.length": 1.0 + 1e-3 * np.arange(3)}
+    asked = {"links": "R32", "pairs": mechanism.pairs[5].name, "derivatives": "C32.length"}
+    swept = planar.sweep(mechanism, designs, 12, stop=angle + 0.5, **asked)
+    assert not swept.status.any()
+    assert swept.general == 0
+    agrees(mechanism, designs, 12, stop=angle + 0.5)
+    # the second design has a coupler that ends its run
+    agrees(mechanism, {"C1.length": np.array([1.0, 0.6])}, 12, stop=angle + 0.5)
+
+
+def test_a_dead_point_of_many_links_is_one_of_few():
+    mechanism = chain_of_dyads(np.random.default_rng(3), 32)
+    start = mechanism.inputs[0].position
+    motion = planar.cycle(mechanism, 12, start, start + 0.02)
+    assert motion.outcome is Outcome.DEAD_POINT
+    agrees(mechanism, {"C32.length": [next(link.length for link in mechanism.links if link.name == "C32")]}, 12)
+
+
+@pytest.mark.parametrize("stem", part([stem for stem in MODELS if len(MODELS[stem].inputs) == 1], 10))
+def test_designs_solved_block_after_block_are_those_solved_together(stem, monkeypatch):
+    mechanism = MODELS[stem]
+    designs = designs_around(mechanism, 1e-3)
+    asked = {"links": mechanism.links[-1].name, "pairs": mechanism.pairs[-1].name}
+    if not isinstance(mechanism.inputs[0].law, type(None)):
+        asked["start"] = mechanism.inputs[0].position
+    together = planar.sweep(mechanism, designs, 24, **asked)
+    monkeypatch.setattr(block, "MAX_JOINED_LINKS", 0)
+    by_blocks = planar.sweep(mechanism, designs, 24, **asked)
+    np.testing.assert_array_equal(by_blocks.status, together.status)
+    for order, near in (("position", 1e-10), ("velocity", 1e-8), ("acceleration", 1e-6)):
+        for name, found in getattr(by_blocks, order).items():
+            expected = getattr(together, order)[name]
+            scale = max(1.0, np.nanmax(np.abs(expected), initial=0.0))
+            np.testing.assert_allclose(found, expected, atol=near * scale)

@@ -19,7 +19,7 @@ from planar.batch.mechanisms.block_type import (
     newton_numbers,
 )
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
-from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, run_steps
+from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, rotations, run_steps
 from planar.codegen.tape import LANES
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at
@@ -141,7 +141,8 @@ class _Starts:
 
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
-        return run_steps(self.tape._replace(clearance=clearance), self.kinds, False, self.state, 1).good > 0
+        tape = self.tape._replace(clearance=clearance)
+        return run_steps(tape, self.kinds, False, self.state, rotations(1, 0.0), 1).good > 0
 
     def judgements(self, batch: BlockBatch) -> Array:
         """How blocks in closed form are judged (blocks, rows), see `BlockType.start_formula`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -19,18 +19,20 @@ from planar.batch.mechanisms.partition import (
 )
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import BadInput
-from planar.model.link_shapes import PointPlacementError
+from planar.model.link_shapes import PointName, PointPlacementError
 from planar.model.mechanism import Mechanism, relative_motions, running_input_index
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 
 class SweepRequest(NamedTuple):
-    """What `sweep_each` asks of every mechanism."""
+    """What is asked of every mechanism: points by their names, those that move if there are none, over `turn` (rad) of
+    the input at `pair`."""
 
     steps: int
-    points: tuple[str, ...] | None
+    points: tuple[PointName, ...] | None
     rates: bool
     pair: str | None
+    turn: float = 2.0 * pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +99,19 @@ class LinkageArrays:
         """How many blocks all linkages have."""
         return int(self.first_block[-1])
 
-    def points(self, names: Sequence[Sequence[str]]) -> LinkArrays:
+    def points(self, names: Sequence[Sequence[PointName]]) -> LinkArrays:
         """Points of every linkage by their names: x and y in the link (m)."""
         points = [
-            np.array([structure.members[name][0] for name in names_of_linkage], dtype=np.int64)
+            np.array([structure.members[name][0] if isinstance(name, str) else -1 for name in names_of_linkage], int)
             for structure, names_of_linkage in zip(self.structures, names, strict=True)
         ]
         pairs = zip(self.structures, points, strict=True)
-        return self._gather([structure.point_places[part] for structure, part in pairs], [2 * part for part in points])
+        rows = self._gather([structure.point_places[part] for structure, part in pairs], [2 * part for part in points])
+        all_names = ((k, name) for k, names_of_linkage in enumerate(names) for name in names_of_linkage)
+        for row, (k, name) in enumerate(all_names):
+            if not isinstance(name, str):
+                rows.link_index[row], rows.numbers[row] = self.structures[k].link_index[name.link], name.at
+        return rows
 
     def sketch_points(self, layouts: Sequence[PointLayout]) -> LinkArrays:
         """Points of every linkage by a layout of its structure: x and y in the link, and in the world (sizes)."""

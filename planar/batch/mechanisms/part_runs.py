@@ -16,7 +16,6 @@ from planar.batch.mechanisms.pins import frame_pins, make_pin_tape, prepare_pins
 from planar.batch.mechanisms.results import PointTable, SweptPart
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
-    FULL_TURN,
     Endings,
     PreparedTape,
     clear_points,
@@ -25,6 +24,7 @@ from planar.batch.mechanisms.tape_runs import (
 )
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.turns import take_turn
+from planar.model.link_shapes import PointName
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind
 from planar.model.pin_linkage import PinnedMechanism
@@ -81,7 +81,8 @@ def _prepare_once(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPar
 
 
 def _prepare(mechanisms: Mechanisms, request: SweepRequest) -> _PreparedPart:
-    pinned, linkages = _pinned_linkages(mechanisms, request.pair)
+    is_named = request.points is None or all(isinstance(name, str) for name in request.points)
+    pinned, linkages = _pinned_linkages(mechanisms if is_named else (), request.pair)
     is_open, start = np.ones(len(mechanisms), dtype=bool), np.zeros(len(mechanisms))
     pins = pin_tape = None
     if linkages is not None:
@@ -134,7 +135,7 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
     values[part.fixed_rows] = 0.0
     values[part.fixed_rows, :2] = part.fixed_places[:, :, None]
     for tape in part.tapes:
-        run_taped_linkages(tape, values, request.steps, endings)
+        run_taped_linkages(tape, values, request.steps, endings, request.turn)
     if part.arrays is not None:
         note_dead_links(part.arrays, endings)
 
@@ -156,7 +157,7 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
 
 def _point_table(
     mechanisms: Mechanisms,
-    names: Sequence[str] | None,
+    names: Sequence[PointName] | None,
     pinned: IntArray,
     pins: PointTable | None,
     arrays: LinkageArrays | None,
@@ -166,7 +167,7 @@ def _point_table(
     pin_rows = {} if pins is None else {k: row for row, k in enumerate(pinned.tolist())}
     structures = {} if arrays is None else dict(zip(arrays.which.tolist(), arrays.structures, strict=True))
 
-    def point_names(k: int) -> Sequence[str]:
+    def point_names(k: int) -> Sequence[PointName]:
         if pins is not None and k in pin_rows:
             return pins.names(pin_rows[k])
         known: Collection[str]
@@ -176,12 +177,12 @@ def _point_table(
             members = named_points(mechanisms[k])
             known = [name for name, _ in members]
             moving = tuple(name for name, points in members if mechanisms[k].frame not in dict(points))
-        return moving if names is None else [name for name in names if name in known]
+        return moving if names is None else [name for name in names if not isinstance(name, str) or name in known]
 
     return PointTable.of_names(list(map(point_names, range(len(mechanisms)))))
 
 
-def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: SweepRequest) -> SolvedDesign:
+def _solve_by_general_path(mechanism: Mechanism, names: Sequence[PointName], request: SweepRequest) -> SolvedDesign:
     """One mechanism as a separate cycle."""
     running = running_input_index(mechanism, request.pair, "inputs")
     inputs = tuple(
@@ -191,6 +192,6 @@ def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: 
     mechanism = replace(mechanism, inputs=inputs)
     pair, grid = inputs[running].pair, None
     if relative_motions(mechanism)[pair].input_kind is not MeasureKind.LENGTH:
-        grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
+        grid = inputs[running].position + np.linspace(0.0, request.turn, request.steps + 1)
     ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
     return solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)

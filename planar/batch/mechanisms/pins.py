@@ -25,6 +25,7 @@ from planar.batch.mechanisms.tape_runs import (
 )
 from planar.codegen.tape import FormulaInput, TapeFormula, compile_block
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
+from planar.model.link_shapes import PointName
 from planar.model.pin_linkages import PinnedLinkages
 from planar.solving.assembly.nearest_assembly import is_surely_farther
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
@@ -148,7 +149,7 @@ def _solve(bars: ca.SX, products: ca.SX) -> ca.SX:
     return ca.vertcat(scale * x, scale * y)
 
 
-def result_pins(linkages: PinnedLinkages, names: Sequence[str] | None) -> PointTable:
+def result_pins(linkages: PinnedLinkages, names: Sequence[PointName] | None) -> PointTable:
     """The pins of these names in every linkage that has them; all that move, if there are no names."""
     if names is None:
         moves = np.ones(len(linkages.positions), dtype=bool)

@@ -13,6 +13,7 @@ from planar.batch.mechanisms.tape_runs import FULL_TURN, Endings
 from planar.foundation.arrays import IntArray, part_offsets
 from planar.foundation.errors import Outcome
 from planar.foundation.short_repr import short_repr
+from planar.model.link_shapes import PointName
 
 Array = np.ndarray
 
@@ -65,21 +66,21 @@ class PointTable(NamedTuple):
 
     first: IntArray
     codes: IntArray
-    labels: tuple[str, ...] | None = None
+    labels: tuple[PointName, ...] | None = None
 
     @classmethod
-    def of_names(cls, names: Sequence[Sequence[str]]) -> PointTable:
+    def of_names(cls, names: Sequence[Sequence[PointName]]) -> PointTable:
         """The table of the names of the points of every mechanism."""
-        codes: dict[str, int] = {}
+        codes: dict[PointName, int] = {}
         flat = [codes.setdefault(name, len(codes)) for point_names in names for name in point_names]
         return cls(part_offsets(list(map(len, names))), np.array(flat, dtype=np.int64), tuple(codes))
 
-    def names(self, k: int) -> list[str]:
+    def names(self, k: int) -> list[PointName]:
         """The names of the points of a mechanism."""
         codes = self.codes[self.first[k] : self.first[k + 1]].tolist()
         return [pin_name(code) if self.labels is None else self.labels[code] for code in codes]
 
-    def rows_of(self, name: str) -> IntArray:
+    def rows_of(self, name: PointName) -> IntArray:
         """The row of a point (mechanisms,), -1 where a mechanism has no such point."""
         rows = np.full(len(self.first) - 1, -1)
         code = pin_number(name) if self.labels is None else {label: k for k, label in enumerate(self.labels)}.get(name)
@@ -94,8 +95,10 @@ def pin_name(number: int) -> str:
     return f"P{number}"
 
 
-def pin_number(name: str) -> int | None:
-    """The number of a pin by its name; None for another name."""
+def pin_number(name: PointName) -> int | None:
+    """The number of a pin by its name; None for another point."""
+    if not isinstance(name, str):
+        return None
     number = name[1:]
     return int(number) if number.isdecimal() and pin_name(int(number)) == name else None
 
@@ -140,7 +143,7 @@ class SweptPart:
         endings = tuple((code, int(counts[code]), self.reason(first)) for first, code in first_ones)
         return (*endings, *((0, len(remarks), remark) for remark in remarks[:1]))
 
-    def present_points(self, names: Iterable[str]) -> set[str]:
+    def present_points(self, names: Iterable[PointName]) -> set[PointName]:
         """Those of some names that points of the mechanisms have."""
         return {name for name in names if np.any(self.points.rows_of(name) >= 0)}
 
@@ -150,7 +153,7 @@ class SweptPart:
 
     def swept(self, k: int) -> Swept:
         """One of them."""
-        names, endings = self.points.names(k), self.endings
+        names, endings = [*map(str, self.points.names(k))], self.endings
         orders = self.orders(self.points.first[k], self.points.first[k + 1])
         position, velocity, acceleration = (
             None if values is None else dict(zip(names, values, strict=True)) for values in orders

@@ -120,23 +120,20 @@ class PreparedTape(NamedTuple):
     find_endings: Mapping[int, FindEnding] = {}
 
 
-def run_taped_linkages(tape: PreparedTape, values: Array, steps: int, endings: Endings) -> None:
-    """Run linkages through a turn of their inputs: values (points, `POINT_ROWS`, numbers), see `make_values`, and
-    the `endings` are filled. Other solvers take what no attempt decides."""
+def run_taped_linkages(
+    tape: PreparedTape, values: Array, steps: int, endings: Endings, turn: float = FULL_TURN
+) -> None:
+    """Run linkages while their inputs turn (rad): values (points, `POINT_ROWS`, numbers), see `make_values`, and the
+    `endings` are filled. Other solvers take what no attempt decides."""
     taped, kinds = tape.taped, tape.make_kinds(values.shape[1] == POINT_ROWS[True])
     undecided = np.arange(len(taped.which))
     for refinement, polished in ATTEMPTS if len(undecided) else ():
-        finer = step_division(steps) * refinement
+        finer = max(ceil(abs(turn) / steps / LONGEST_INPUT_STEP), 1) * refinement
         for indices in _chunks(taped, undecided, padded_steps(steps * finer + 1) * values.shape[1] * 8, finer > 1):
-            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, tape.find_endings)
+            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, tape.find_endings, turn)
         undecided = undecided[endings.solved[taped.which[undecided]] < 0]
         if not undecided.size:
             break
-
-
-def step_division(steps: int) -> int:
-    """The number of parts into which a step is divided."""
-    return ceil(FULL_TURN / steps / LONGEST_INPUT_STEP)
 
 
 def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") -> Array:
@@ -169,11 +166,12 @@ def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divide
         first = last
 
 
-def run_steps(taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: Array, count: int) -> TapeResult:
-    """Compute the result points (points, rows, numbers) of linkages at `count` steps of a turn, or at the start."""
+def run_steps(
+    taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: Array, rotation: Array, count: int
+) -> TapeResult:
+    """Compute the result points (points, rows, numbers) of linkages at `count` `rotations` of their inputs."""
     stride, slots = padded_steps(count), taped.slots
     room = np.empty((max(-int(slots.min()), -1 - FIRST_ROOM_SLOT), max(kinds.room_rows, 1 + TABLE_ANGLE), stride))
-    rotation = rotations(count)
     room[-1 - TABLE, : 1 + TABLE_ANGLE] = np.cos(rotation), np.sin(rotation), rotation
     if kinds.frame_rows:
         room[-1 - FRAME] = 0.0
@@ -183,7 +181,7 @@ def run_steps(taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: A
         slots >= 0, points.ctypes.data + slots * points.strides[0], room.ctypes.data + (-1 - slots) * room.strides[0]
     )
     if kinds.step_table is not None:
-        table = np.ascontiguousarray(kinds.step_table(count, FULL_TURN / max(count - 1, 1)))
+        table = np.ascontiguousarray(kinds.step_table(count, float(rotation[1])))
         addresses[slots == STEP_TABLE] = table.ctypes.data
     present = np.flatnonzero(np.bincount(taped.kinds))
     numbers = np.zeros(present[-1] + 1, dtype=np.int64)
@@ -192,9 +190,9 @@ def run_steps(taped: TapedLinkages, kinds: BlockKinds, polished: bool, points: A
     return run_tape([kinds.compile(k, polished) for k in present.tolist()], count, tape)
 
 
-def rotations(count: int) -> Array:
-    """The rotation of the inputs at `count` steps of a turn, padded."""
-    return np.arange(padded_steps(count)) * (FULL_TURN / max(count - 1, 1))
+def rotations(count: int, turn: float) -> Array:
+    """How far the inputs are turned at `count` steps, padded (rad)."""
+    return np.arange(padded_steps(count)) * (turn / max(count - 1, 1))
 
 
 def _run_once(
@@ -206,6 +204,7 @@ def _run_once(
     finer: int,
     endings: Endings,
     find_endings: Mapping[int, FindEnding],
+    turn: float,
 ) -> None:
     """Run linkages with steps divided by a factor, and note the endings of those that this decides."""
     count, points = steps * finer + 1, values
@@ -215,11 +214,10 @@ def _run_once(
         points, slots = np.empty((len(rows), values.shape[1], padded_steps(count))), taped.slots.copy()
         slots[is_result] = places
         taped = taped._replace(slots=slots)
-    good, outcome, last_blocks = run_steps(taped, kinds, polished, points, count)
+    rotation = rotations(count, turn)
+    good, outcome, last_blocks = run_steps(taped, kinds, polished, points, rotation, count)
     if finer > 1:
         values[rows, :, : steps + 1] = points[:, :, :count:finer]
-
-    rotation = rotations(count)
     which, is_sure, is_dead = taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
     endings.solved[which[is_sure]] = (good[is_sure] - 1) // finer + 1
     first_bad, dead = good[is_dead], which[is_dead]
