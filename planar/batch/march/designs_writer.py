@@ -28,7 +28,7 @@ from planar.batch.march.prediction import (
     LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     LEAST_START_REGULARITY,
-    PREDICTOR_ORDER,
+    TABLE_COLUMNS,
     least_regularity,
 )
 from planar.codegen.tape import LinkDirection, write_turn_flags
@@ -37,10 +37,10 @@ from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import UnknownRates, block_jacobian
 from planar.foundation.instruction_list import UnsupportedOperation
 
-MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
-MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
+MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table")
+MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 6, *("float",) * 2, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
-from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
+from the next; p, q, state, drives, rates, table; tolerance, scale; out, good, candidates."""
 INVARIANT_KINDS = frozenset({"p", "q", "u1", "u2", "scale", "stop", "number"})
 """Of operands that are the same at all steps of a design."""
 
@@ -122,7 +122,7 @@ class _DesignsKernelWriter(KernelWriter):
         rows = 2 * len(self.links) * (3 if self.rates else 1) if self.results is None else self.results.row_count
         rows += 0 if self.request.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in _READ_ARRAYS)
-        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
+        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "scale"))
         written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
         sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
         t.write_line(f"define void @{MARCH_FUNCTION}({sizes}, {arrays}, {numbers}, {written}) {{")
@@ -143,7 +143,7 @@ class _DesignsKernelWriter(KernelWriter):
         flags = []
         for part in self.equations.blocks:
             if part.closed_form is None:
-                self._write_newton_block(part, have)
+                self.write_newton_block(part, have)
             else:
                 flags.append(self._write_closed_form_block(part, have))
         flags += self._write_stops(have)
@@ -202,18 +202,11 @@ class _DesignsKernelWriter(KernelWriter):
         t = self.ir
         t.write_label("step")
         t.write_line("%k = phi i64 [0, %block], [%knext, %stepend]")
-        begin = t.add_instruction(f"mul i64 %k, {PREDICTOR_ORDER + 3 * self.input_count}")
-
-        def tabled(k: int) -> str:
-            return t.broadcast(
-                t.add_instruction(
-                    f"load double, ptr {t.double_pointer('%table', t.add_instruction(f'add i64 {begin}, {k}'))}"
-                )
-            )
-
-        self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
+        begin = t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS + 3 * self.input_count}")
+        row = t.double_pointer("%table", begin)
         for k, turns in enumerate(self.equations.input_is_angle):
-            by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
+            places = [t.double_pointer(row, str(TABLE_COLUMNS + 3 * k + j)) for j in range(3)]
+            by, cos, sin = (t.broadcast(t.add_instruction(f"load double, ptr {place}")) for place in places)
             if self.request.has_common_inputs:
                 have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
                 continue
@@ -221,7 +214,8 @@ class _DesignsKernelWriter(KernelWriter):
             if turns:
                 have["uc", k], have["us", k] = write_angle_sum(t, at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.regularity_slot)
-        self.begin_newton_step()
+        if self.newton_unknowns:
+            self.begin_newton_step(row)
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> str:
         """A block in closed form; a flag that says where its two assemblies keep apart."""
@@ -296,13 +290,6 @@ class _DesignsKernelWriter(KernelWriter):
         for leaf in ("zc", "zs", "z"):
             t.store(have[leaf, k], self.state_slots[leaf, k])
 
-    def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
-        """Newton's method for a block, with as many corrections as the step has."""
-        t = self.ir
-        self.write_prediction(part)
-        count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
-        self.write_corrections(part, have, count)
-
     def _write_rates(self, have: OperandNames) -> None:
         """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers.
 
@@ -358,8 +345,7 @@ class _DesignsKernelWriter(KernelWriter):
         if self.newton_unknowns:
             minimum = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(minimum)))
-            is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
-            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
+            flags.append(self.write_is_as_predicted())
         passed = [self.write_passed(flags, self.passed_slot)]
         pointers = result_pointers(t, self.lane, len(outputs), self.request.is_single)
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted

@@ -8,7 +8,7 @@ then is brought to it. So no sine stands in the loop, and few divisions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
 from typing import NamedTuple
 
 import casadi as ca
@@ -22,9 +22,9 @@ from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.generic_evaluation import inline_function
-from planar.equations.linear import solve_by_determinants
+from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.mechanism_numbers import equation_structure
-from planar.equations.rates import UnknownRates, first_and_second_rates
+from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import (
     closing_error,
     input_positions,
@@ -111,6 +111,8 @@ class KernelEquations:
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
         self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.has_large_blocks = any(part.is_large for part in self.blocks)
+        self.newton_steps: dict[int, tuple[InstructionList[Operand], list[int]]] = {}
+        "the listings of `KernelInstructions.list_newton_step`, by block"
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.frames, self.pair_coordinates = frames_from_coordinates(
             ca.vertsplit(e.w),
@@ -137,16 +139,6 @@ class KernelEquations:
         }
         carrying = {k for row, k in zip(rows, columns, strict=True) if self.is_angle[k] and row not in own_rows[k]}
         return tuple(sorted(carrying))
-
-    def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
-        signs: np.ndarray = np.sign(self._sides_function(z, u, p).full())
-        return signs.ravel() if z.ndim == 1 else signs
-
-    @cached_property
-    def _sides_function(self) -> ca.Function:
-        e = self.equations
-        return ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])
 
     def residuals(self) -> ca.SX:
         """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
@@ -232,8 +224,32 @@ class KernelInstructions:
     def list_values(self, outputs: Sequence[ca.SX], written: int | None = None) -> list[int]:
         """The numbers, in `hoister.result`, of the values of expressions. Raises UnsupportedOperation.
 
-        `written`: so many are there already, see `check_length`; where it is None there may be any number.
+        `written`: the count of earlier instructions, see `check_length`; None without a limit.
         """
+        return self.hoister.rebuild(*self._list_expressions(outputs, written))
+
+    def list_newton_step(self, part: KernelBlock, written: int) -> list[int]:
+        """The numbers, in `hoister.result`, of Newton's step of a block, the square of the volume that the columns of
+        its Jacobian span, the product of the squares of their lengths, and the square of the shortest column.
+
+        Where a column vanishes, as with the arm of a slide on which a link turns, an unknown is not determined, however
+        large the angles between the columns. The listing is cached with the equations, since all functions of these
+        have it in common. Without the step and the product, and with all columns in place of the volume: the residual,
+        the Jacobian and the shortest column of a large block, of which numbers are solved. Raises UnsupportedOperation.
+        """
+        index = part.block.block_index
+        if index not in self.equations.newton_steps:
+            e, block = self.equations.equations, part.block
+            residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
+            squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
+            solved = [residual, ca.vec(jacobian)] if part.is_large else solve_with_volume(jacobian, residual)
+            self.equations.newton_steps[index] = self._list_expressions([*solved, squared_arm], written)
+        return self.hoister.rebuild(*self.equations.newton_steps[index])
+
+    def _list_expressions(
+        self, outputs: Sequence[ca.SX], written: int | None
+    ) -> tuple[InstructionList[Operand], list[int]]:
+        """The instructions of expressions, and the numbers of their values. Raises UnsupportedOperation."""
         function = ca.Function("part", list(self.symbols.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
         if written is not None:
             check_length(written + function.n_instructions())
@@ -252,7 +268,7 @@ class KernelInstructions:
                 if is_angle:
                     angles[numbers[k]] = CosSin(*(listing.add_input((name + part, k)) for part in "cs"))
         (values,) = inline_function(listing, function, arguments)
-        return self.hoister.rebuild(*expand_angle_sums(listing, values, angles))
+        return expand_angle_sums(listing, values, angles)
 
     def closed_form_operands(self, part: KernelBlock) -> list[Operand]:
         """What stands for the unknowns of a block in closed form, in the order of `closed_form_outputs`."""

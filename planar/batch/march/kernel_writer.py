@@ -14,13 +14,12 @@ from planar.batch.march.prediction import (
     LEAST_START_REGULARITY,
     MAX_TURN_PER_STEP,
     PREDICTOR_ORDER,
+    TABLE_COLUMNS,
 )
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.closed_form import ClosedForm
-from planar.equations.linear import solve_with_volume
-from planar.equations.rates import block_jacobian
 from planar.foundation.instruction_list import required_values
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
 
@@ -53,7 +52,6 @@ class KernelWriter(KernelInstructions):
         "the first design of the block of designs that is computed"
         self.hoisted_names: dict[int, str] = {}
         "of what does not vary"
-        self.predictor_weights: list[str] = []
         self.linear_systems: LinearSystems | None = None
 
     def entry_pointer(self, base: str, row: int) -> str:
@@ -66,7 +64,10 @@ class KernelWriter(KernelInstructions):
 
     def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
         """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
-        results = self.list_values(outputs, self.ir.count)
+        return self._write_listed(self.list_values(outputs, self.ir.count), names)
+
+    def _write_listed(self, results: list[int], names: Mapping[Operand, str]) -> list[str]:
+        """Write the values with these numbers of `hoister.result`. Raises BareAngle, UnsupportedOperation."""
         made, invariants = self.hoister.result, self.hoister.invariants
         order = required_values(made, results)
         written = {}
@@ -119,16 +120,31 @@ class KernelWriter(KernelInstructions):
                 t.store("zeroinitializer", t.element_pointer(ring, str(k)))
             t.store(state[leaf], t.element_pointer(ring, str(HISTORY_LENGTH - 1)))
 
-    def begin_newton_step(self) -> None:
-        """Begin step %k: nothing is corrected yet."""
+    def begin_newton_step(self, row: str) -> None:
+        """Begin step %k: load its row of the `step_table`; nothing is corrected yet."""
         t = self.ir
+        *weights, count, limit = (
+            t.add_instruction(f"load double, ptr {t.double_pointer(row, str(k))}") for k in range(TABLE_COLUMNS)
+        )
+        self.predictor_weights = [t.broadcast(weight) for weight in weights]
+        self.correction_count = t.add_instruction(f"fptosi double {count} to i64")
+        self.correction_limit = t.broadcast(limit)
         t.store("zeroinitializer", self.correction_slot)
         self.history_indices = [
             t.add_instruction(f"and i64 {t.add_instruction(f'sub i64 %k, {j + 1}')}, {HISTORY_LENGTH - 1}")
             for j in range(PREDICTOR_ORDER)
         ]
 
-    def write_prediction(self, part: KernelBlock) -> None:
+    def write_newton_block(self, part: KernelBlock, names: OperandNames) -> None:
+        """Predict the state of a block from the steps before, then correct it by Newton's method."""
+        self._write_prediction(part)
+        self._write_corrections(part, names)
+
+    def write_is_as_predicted(self) -> str:
+        """A flag: all corrections of a step together are at most the limit of its row of the `step_table`."""
+        return self.ir.compare("ole", self.ir.load(self.correction_slot), self.correction_limit)
+
+    def _write_prediction(self, part: KernelBlock) -> None:
         """Predict the state of a block from the steps before, by `predictor_weights`."""
         t, slots = self.ir, self._block_slots(part)
         ahead = {
@@ -149,8 +165,8 @@ class KernelWriter(KernelInstructions):
     def _block_slots(self, part: KernelBlock) -> OperandNames:
         return {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
 
-    def write_corrections(self, part: KernelBlock, have: OperandNames, count: str) -> None:
-        """Correct a block from where it is predicted by `count` of Newton's steps."""
+    def _write_corrections(self, part: KernelBlock, have: OperandNames) -> None:
+        """Correct the predicted state of a block by `correction_count` steps of Newton's method."""
         t, level, slots = self.ir, part.block.block_index, self._block_slots(part)
         regularity, correction = t.load(self.regularity_slot), t.load(self.correction_slot)
         block_correction = self.block_correction_slots[level]
@@ -177,7 +193,7 @@ class KernelWriter(KernelInstructions):
         for leaf, slot in slots.items():
             t.store(unknowns[leaf], slot)
         t.store(t.add_all([t.load(block_correction), *magnitudes]), block_correction)
-        t.close_loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
+        t.close_loop(f"n{level}", self.correction_count.lstrip("%"), f"newton{level}", f"solved{level}")
         t.write_label(f"solved{level}")
         have.update({leaf: t.load(slot) for leaf, slot in slots.items()})
         block_regularity = self.write_regularity(volume, lengths, squared_arm, len(part.unknowns))
@@ -196,18 +212,14 @@ class KernelWriter(KernelInstructions):
         return self.ir.binary("div", volume, lengths)
 
     def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
-        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
-        and the square of the shortest: where it vanishes, as with the arm of a slide on which a link turns, an unknown
-        is not determined, however far the others' columns are from each other."""
-        e, block = self.equations.equations, part.block
-        residual, jacobian = e.F[block.rows], block_jacobian(e, block.rows, block.unknowns)
-        squared_arm = reduce(ca.fmin, (ca.sumsqr(column) for column in ca.horzsplit(jacobian)), ca.SX(1.0))
+        """Newton's step of a block and what tells how regular it is, see `list_newton_step`."""
+        values = self._write_listed(self.list_newton_step(part, self.ir.count), names)
         if not part.is_large:
-            return self.write_values([*solve_with_volume(jacobian, residual), squared_arm], names)
+            return values
         assert self.linear_systems is not None
-        residuals, columns, arms = self.write_separately([residual, ca.vec(jacobian), squared_arm], names)
-        volume = self.linear_systems.factorise(columns, len(residuals))
-        return [*self.linear_systems.solve(residuals), volume, self.ir.constant(1.0), *arms]
+        count = len(part.unknowns)
+        volume = self.linear_systems.factorise(values[count:-1], count)
+        return [*self.linear_systems.solve(values[:count]), volume, self.ir.constant(1.0), values[-1]]
 
     def stop_number_names(self, load_row: Callable[[int], str]) -> OperandNames:
         """The numbers of stops, which stand behind p, by what loads a row of it."""

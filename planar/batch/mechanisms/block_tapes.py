@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.prediction import step_table
 from planar.batch.mechanisms.block_type import (
     COS,
     POSE_ROWS,
@@ -22,7 +23,6 @@ from planar.batch.mechanisms.block_type import (
     BlockType,
     X,
     Y,
-    step_table,
     write_formula,
 )
 from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays
@@ -45,6 +45,8 @@ RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
 """Kinds of the blocks of a tape: types of blocks of links come last."""
 INPUT_NUMBERS = 5
 """Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
+CORRECTIONS, FIRST_CORRECTIONS = 2, 10
+"""Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
 LEAST_CLEARANCE = 1e-4
 """Minimum distance measure from a dead point of an assembly that is taken."""
 
@@ -105,7 +107,8 @@ def make_block_kinds(types: Sequence[BlockType], rates: bool, is_start: bool = F
         return kind.start_function if is_start and kind.has_closed_form else kind.run_function(rates, polished)
 
     has_newton_blocks = not all(kind.has_closed_form for kind in types)
-    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table if has_newton_blocks else None)
+    table = partial(step_table, corrections=CORRECTIONS, first_corrections=FIRST_CORRECTIONS)
+    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, table if has_newton_blocks else None)
 
 
 def _pose_rows(rates: bool) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_normalised, write_rational_rotation
-from planar.batch.march.prediction import LEAST_COSINE, PREDICTOR_ORDER, correction_limit, prediction_weights
+from planar.batch.march.prediction import LEAST_COSINE, TABLE_COLUMNS
 from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.generic_evaluation import inline_function
@@ -80,9 +80,6 @@ MAX_SIGNS = 2
 """Maximum number of signs of a block type in closed form."""
 MAX_BLOCK_TYPES = 1024
 """Number of block types that are kept."""
-CORRECTIONS, FIRST_CORRECTIONS = 2, 10
-"""Steps of Newton's method where there are enough earlier steps for a prediction, and before."""
-TABLE_COLUMNS = PREDICTOR_ORDER + 2
 JUDGED_ROWS = 4
 """Number of rows after the signs in the result of `BlockType.start_function`."""
 
@@ -121,16 +118,16 @@ class BlockType:
         "how many blocks of its equations have two assembly modes"
         self._texts: dict[tuple[bool, bool] | None, BlockText] = {}
         has_forms = len(forms) == len(blocks) and self.sign_count <= MAX_SIGNS
-        self.has_closed_form = has_forms and self._can_be_written(blocks, (None,))
+        self.has_closed_form = has_forms and self._can_be_written(blocks, None)
         "whether all unknowns are in closed form, by functions that can be compiled"
         size = slice(0, e.z.numel())
         together = KernelBlock(Block(size, size, self.inner_links, (), False, 0), None)
-        options = (False, False), (True, False)
-        self.has_newton_functions = not self.has_closed_form and self._can_be_written([together], options)
+        # the run with rates has all instructions of the one without
+        self.has_newton_functions = not self.has_closed_form and self._can_be_written([together], (True, False))
         "whether Newton's method can follow it, where it is not in closed form"
 
-    def _can_be_written(self, blocks: Sequence[KernelBlock], options: Sequence[tuple[bool, bool] | None]) -> bool:
-        """Whether the functions of these options can be written with the equations in these blocks."""
+    def _can_be_written(self, blocks: Sequence[KernelBlock], option: tuple[bool, bool] | None) -> bool:
+        """Whether the function of an option, see `_write`, can be written with the equations in these blocks."""
         if not self.is_square:
             return False
         given = self.given_links
@@ -138,8 +135,7 @@ class BlockType:
             self.equations, self.mechanism, given_links=given, blocks=tuple(blocks), turns_numbers=True
         )
         try:
-            for option in options:
-                self._write(option)
+            self._write(option)
         except (UnsupportedOperation, BareAngle):
             return False
         return True
@@ -231,17 +227,11 @@ class _BlockTypeWriter(KernelWriter):
         text.begin_steps(len(self.inner_slots))
         names = self._load_operands(rates)
         row = t.double_pointer(text.slot(self.block_type.slot_count), t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS}"))
-        *weights, count, limit = (
-            t.add_instruction(f"load double, ptr {t.double_pointer(row, str(k))}") for k in range(TABLE_COLUMNS)
-        )
-        self.predictor_weights = [t.broadcast(weight) for weight in weights]
         t.store(t.constant(1.0), self.regularity_slot)
-        self.begin_newton_step()
-        self.write_prediction(part)
-        self.write_corrections(part, names, t.add_instruction(f"fptosi double {count} to i64"))
+        self.begin_newton_step(row)
+        self.write_newton_block(part, names)
         rows, residual = self._write_links(names, rates)
-        is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast(limit))
-        is_good = t.and_flags(t.compare("ole", residual, text.tolerance), is_near)
+        is_good = t.and_flags(t.compare("ole", residual, text.tolerance), self.write_is_as_predicted())
         self._end_run(rows, is_good, t.load(self.regularity_slot))
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
@@ -371,16 +361,6 @@ class _BlockTypeWriter(KernelWriter):
 
 def _part_of(values: Sequence[str], index: int, size: int) -> Sequence[str]:
     return values[size * index : size * (index + 1)]
-
-
-def step_table(steps: int, step: float) -> Array:
-    """Of every step of such a length the weights of the steps before, how often it is corrected, and by how much at
-    most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
-    table = np.empty((steps, TABLE_COLUMNS))
-    table[:, :PREDICTOR_ORDER] = prediction_weights(steps)
-    table[:, -2:] = CORRECTIONS, correction_limit(step)
-    table[: PREDICTOR_ORDER + 1, -2], table[:PREDICTOR_ORDER, -1] = FIRST_CORRECTIONS, inf
-    return table
 
 
 def newton_numbers(block_type: BlockType, p: Array, start: Array) -> Array:

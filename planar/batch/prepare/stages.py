@@ -31,6 +31,7 @@ from planar.batch.march.kernel import KernelBlock, KernelEquations, Operand, ope
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
+    CORRECTIONS_COLUMN,
     LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     MAX_TURN_PER_STEP,
@@ -39,7 +40,7 @@ from planar.batch.march.prediction import (
     least_regularity,
     longest_step,
 )
-from planar.batch.march.runs import run_designs, step_table, unknowns_at_steps
+from planar.batch.march.runs import run_designs, run_table, unknowns_at_steps
 from planar.batch.prepare.compiled_runs import (
     ALL_SOLVED,
     CANNOT_BE_ASSEMBLED,
@@ -389,9 +390,8 @@ def newton_stages(
     march = write_designs_kernel(KernelRequest(equations, links, rates, LANES, (-1,) * len(links), streams=False))
     starts, assembly_counts, lanes = _assembly_lanes(reference, equations)
     kernels = [compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS) for kernel in (corrector, march)]
-    table, counts = _step_table(u, steps)
-    start_table, start_counts = step_table(np.zeros((1, u.shape[1])))
-    start_counts[:] = CORRECTIONS
+    start_table = run_table(np.zeros((1, u.shape[1])))
+    start_table[:, CORRECTIONS_COLUMN] = CORRECTIONS
     # the place of each position in the rows of the march; the last one is repeated
     position = np.minimum(np.arange(padded_width(len(u))), len(u) - 1)
     lane = np.searchsorted(firsts, position, side="right") - 1
@@ -403,12 +403,10 @@ def newton_stages(
         "starts": operand_rows(corrector.state, starts),
         "start inputs": operand_rows(corrector.inputs, np.repeat(u[:1].T, LANES, axis=1)),
         "start table": start_table,
-        "start counts": start_counts,
         "march": kernels[1],
         "states": operand_rows(march.state, _own_unknowns(reference, u, members, firsts)),
         "inputs": operand_rows(march.inputs, u[firsts].T),
-        "table": table,
-        "counts": counts,
+        "table": _piece_table(u, steps),
         "steps": steps + 1,
         "places": (position - firsts[lane]) * march.output_row_count * LANES + lane,
         "correction limit": correction_limit(longest_step(u)),
@@ -515,12 +513,12 @@ class _NewtonWriter:
         return base
 
     def _write_kernel_call(
-        self, function: str, arrays: Sequence[str], steps: str, row_count: int, limits: Sequence[str], out: str
+        self, function: str, arrays: Sequence[str], steps: str, row_count: int, scale: str, out: str
     ) -> str:
         """Call a kernel; the pointer to how many steps of each lane are good."""
         good = self._take_scratch(1)
         pointers = ", ".join(f"ptr {array}" for array in arrays)
-        numbers = ", ".join(f"double {limit}" for limit in limits)
+        numbers = f"double {self._number('tolerance')}, double {scale}"
         self.ir.write_line(
             f"call void {self._constant(function)}(i64 1, i64 {steps}, i64 {LANES}, i64 {LANES}, "
             f"i64 {row_count * LANES}, {pointers}, {numbers}, ptr {out}, ptr {good}, ptr null)"
@@ -532,9 +530,8 @@ class _NewtonWriter:
         count = self.corrector.output_row_count
         out = self._take_scratch(count)
         arrays = [rows["p"], rows["at"], self._constant("starts"), self._write_inputs("start inputs"), rows["u1"]]
-        arrays += [self._constant("start table"), self._constant("start counts")]
-        limits = (self._number("tolerance"), "0x7FF0000000000000", "1.0")
-        return self._write_kernel_call("corrector", arrays, "1", count, limits, out), out
+        arrays.append(self._constant("start table"))
+        return self._write_kernel_call("corrector", arrays, "1", count, "1.0", out), out
 
     def _lane(self, value: str, lane: int = 0) -> str:
         """The number of one lane in every lane."""
@@ -614,11 +611,11 @@ class _NewtonWriter:
     def _write_march(self, rows: dict[str, str]) -> tuple[str, str]:
         """The run, a piece in each lane: how many steps went well, and the rows of the kernel at all steps."""
         arrays = [rows["p"], rows["q"], self._constant("states"), self._write_inputs("inputs"), rows["u1"]]
-        arrays += [self._constant("table"), self._constant("counts")]
-        limits = (self._number("tolerance"), self.limit, self._number("unit"))
+        arrays.append(self._constant("table"))
         # the rows stand at the end of the memory, where there is room for as many steps as there are
         out, count = self.ir.double_pointer("%scratch", str(self.scratch_size + LANES)), self.march.output_row_count
-        return self._write_kernel_call("march", arrays, self._constant("steps"), count, limits, out), out
+        scale = self._number("unit")
+        return self._write_kernel_call("march", arrays, self._constant("steps"), count, scale, out), out
 
     def _write_gather(self, good: str, out: str) -> None:
         """Write the results and the states of all positions in their order, if all of them are solved and regular."""
@@ -723,12 +720,13 @@ def _assembly_lanes(reference: ReferenceDesign, equations: KernelEquations) -> t
     return np.array(starts).T, [lists[part.block.block_index][1] for part in equations.blocks], lanes
 
 
-def _step_table(u: Array, steps: int) -> tuple[Array, Array]:
-    """The table of a piece of `steps` steps, and the corrections of each."""
-    table, counts = step_table(u[: steps + 1] - u[0])
-    # what is predicted from so few steps is off by as many powers of a step; each correction doubles the digits
+def _piece_table(u: Array, steps: int) -> Array:
+    """The `run_table` of a piece of `steps` steps."""
+    table = run_table(u[: steps + 1] - u[0])
+    counts = table[:, CORRECTIONS_COLUMN]
+    # a prediction by k positions has an error of order k in the step; a correction doubles the digits
     digits = max(-log10(longest_step(u)), 0.3)
     for step in range(1, PREDICTOR_ORDER + 1):
         counts[step] = max(counts[-1], ceil(log2(max(DIGITS / (step * digits), 1.0))) + 1)
     counts[0] = START_CORRECTIONS
-    return table, counts
+    return table
