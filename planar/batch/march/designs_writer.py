@@ -170,9 +170,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %blockend]")
         self.lane = t.add_instruction(f"mul i64 %b, {t.lanes}")
-        have: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
-        have |= self.stop_number_names(lambda k: self.load_entry("%p", k))
-        have |= {("q", k): self.load_entry("%q", k) for k in range(2 * len(self.links))}
+        have = self.load_numbers()
         if self.results is not None:
             first = 2 * len(self.links)
             have |= {("number", k): self.load_entry("%q", first + k) for k in range(self.results.numbers.numel())}

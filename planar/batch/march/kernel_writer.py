@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
-from math import sqrt
+from math import inf, sqrt
 
 import casadi as ca
 
@@ -221,10 +221,13 @@ class KernelWriter(KernelInstructions):
         volume = self.linear_systems.factorise(values[count:-1], count)
         return [*self.linear_systems.solve(values[:count]), volume, self.ir.constant(1.0), values[-1]]
 
-    def stop_number_names(self, load_row: Callable[[int], str]) -> OperandNames:
-        """The numbers of stops, which stand behind p, by what loads a row of it."""
-        first = self.symbols["p"].numel()
-        return {("stop", k): load_row(first + k) for k in range(self.symbols["stop"].numel())}
+    def load_numbers(self) -> OperandNames:
+        """Load the numbers of pairs and of stops, which follow in the rows of p, and of points, from q."""
+        count = self.symbols["p"].numel()
+        rows = [("p", k, "%p", k) for k in range(count)]
+        rows += [("stop", k, "%p", count + k) for k in range(self.symbols["stop"].numel())]
+        rows += [("q", k, "%q", k) for k in range(2 * len(self.links))]
+        return {(kind, k): self.load_entry(base, row) for kind, k, base, row in rows}
 
     def write_stops(self, names: OperandNames) -> list[str]:
         """What reaches one where a pair meets its stop, of each pair with stops."""
@@ -270,6 +273,25 @@ class KernelWriter(KernelInstructions):
             )
 
         return [residual(have["zc", k], have["zs", k]) for k, turns in enumerate(self.equations.is_angle) if turns]
+
+
+def write_squared_distance(t: IRWriter, coordinates: Sequence[str], targets: Sequence[str]) -> str:
+    """The squared distance of coordinates from their targets."""
+    gaps = [t.binary("sub", *both) for both in zip(coordinates, targets, strict=True)]
+    return t.add_all([t.constant(0.0), *(t.binary("mul", gap, gap) for gap in gaps)])
+
+
+def write_nearest(t: IRWriter, options: Sequence[tuple[Sequence[str], str]]) -> tuple[list[str], str, str]:
+    """Of options, each with its values and its squared distance to the sketch, the values and the distance of the
+    nearest, and the distance of the next one, infinite without any."""
+    first, nearest = options[0]
+    values, second = list(first), t.constant(inf)
+    for other, distance in options[1:]:
+        is_nearer = t.compare("olt", distance, nearest)
+        values = [t.select(is_nearer, *both) for both in zip(other, values, strict=True)]
+        second = t.call_intrinsic("minnum", second, t.call_intrinsic("maxnum", nearest, distance))
+        nearest = t.call_intrinsic("minnum", nearest, distance)
+    return values, nearest, second
 
 
 def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from itertools import product
 from math import inf
 from typing import Any, NamedTuple
@@ -12,7 +12,13 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_normalised, write_rational_rotation
+from planar.batch.march.kernel_writer import (
+    KernelWriter,
+    OperandNames,
+    write_nearest,
+    write_normalised,
+    write_rational_rotation,
+)
 from planar.batch.march.prediction import LEAST_COSINE, TABLE_COLUMNS
 from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
 from planar.equations.closed_form import ClosedForm, find_closed_form
@@ -321,42 +327,37 @@ class _BlockTypeWriter(KernelWriter):
         t, text, kind = self.ir, self.text, self.block_type
         text.begin_steps()
         operands, count = self._load_operands(False), len(self.inner_slots)
-        sums = [
-            [text.number(kind.number_count + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)] for k in range(count)
-        ]
-        far = t.constant(FAR_AWAY)
-        outputs, nearest, second, least_clear = list[str](), far, far, t.constant(inf)
+        sum_names = {("sum", k): text.number(kind.number_count + k) for k in range(SKETCH_SUMS * count)}
+        poses, sums = (ca.SX.sym(name, size * count) for name, size in (("pose", POSE_ROWS), ("sum", SKETCH_SUMS)))
+        self.symbols |= {"pose": poses, "sum": sums}
+        links = zip(ca.vertsplit(poses, POSE_ROWS), ca.vertsplit(sums, SKETCH_SUMS), strict=True)
+        squared_distance = sum(squared_sketch_distance(*map(ca.vertsplit, link)) for link in links)
+        far, least_clear = t.constant(FAR_AWAY), t.constant(inf)
+        options = []
         for signs in product((1.0, -1.0), repeat=kind.sign_count):
             sign_names = {("sign", k): t.constant(sign) for k, sign in enumerate(signs)}
             names: OperandNames = operands | sign_names
             clear = self._write_closed_forms(names)
             rows, residual = self._write_links(names)
-            mode = [*(value for row in rows for value in row), *sign_names.values(), residual]
+            values = [value for row in rows for value in row]
+            pose_names = {("pose", k): value for k, value in enumerate(values)}
+            (distance,) = self.write_values([squared_distance], pose_names | sum_names)
             # a mode that cannot be assembled is far away
-            distance = t.select(t.compare("olt", residual, far), self._write_sketch_distance(rows, sums), far)
-            is_nearer = t.compare("olt", distance, nearest)
-            outputs = [t.select(is_nearer, *both) for both in zip(mode, outputs, strict=True)] if outputs else mode
-            second = t.call_intrinsic("minnum", second, t.call_intrinsic("maxnum", nearest, distance))
-            nearest = t.call_intrinsic("minnum", nearest, distance)
+            distance = t.select(t.compare("olt", residual, far), distance, far)
+            options.append(([*values, *sign_names.values(), residual], distance))
             least_clear = t.call_intrinsic("minnum", least_clear, t.call_intrinsic("fabs", clear))
         places = [(slot, row) for slot in self.inner_slots for row in range(POSE_ROWS)]
         places += [(kind.slot_count, k) for k in range(kind.sign_count + JUDGED_ROWS)]
-        *outputs, residual = outputs
+        (*outputs, residual), nearest, second = write_nearest(t, options)
         text.store_rows([*outputs, nearest, second, residual, least_clear], places)
         text.end_steps()
 
-    def _write_sketch_distance(self, rows: list[list[str]], sums: list[list[str]]) -> str:
-        """The squared distance of the links' points to the sketch, from the sums of its points."""
-        t = self.ir
-        add, sub, mul = (partial(t.binary, what) for what in ("add", "sub", "mul"))
-        total = t.constant(0.0)
-        for (x, y, c, s), (count, px, py, tx, ty, along, across, squares) in zip(rows, sums, strict=True):
-            rotated = sub(mul(c, px), mul(s, py)), add(mul(s, px), mul(c, py))
-            mixed = add(mul(x, sub(rotated[0], tx)), mul(y, sub(rotated[1], ty)))
-            mixed = sub(mixed, add(mul(c, along), mul(s, across)))
-            square = mul(count, add(mul(x, x), mul(y, y)))
-            total = add(total, add(add(square, add(mixed, mixed)), squares))
-        return total
+
+def squared_sketch_distance(pose: Iterable[Any], sums: Iterable[Any]) -> Any:
+    """The squared distance of the points of a link to the sketch, by x, y, cos and sin, from the sums of its points."""
+    (x, y, c, s), (count, px, py, tx, ty, along, across, squares) = pose, sums
+    mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
+    return count * (x * x + y * y) + 2.0 * mixed + squares
 
 
 def _part_of(values: Sequence[str], index: int, size: int) -> Sequence[str]:

@@ -17,6 +17,7 @@ from planar.batch.mechanisms.block_type import (
     SKETCH_SUMS,
     BlockType,
     newton_numbers,
+    squared_sketch_distance,
 )
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
 from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, run_steps
@@ -163,12 +164,10 @@ class _Starts:
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
         inner = self.places[batch.block_type][:, batch.inner_slots]
-        x, y, c, s = np.moveaxis(self.state[inner, :POSE_ROWS, 0], 2, 0)
-        counts, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
+        poses, sums = (np.moveaxis(rows, 2, 0) for rows in (self.state[inner, :POSE_ROWS, 0], self.sums[inner]))
         with np.errstate(invalid="ignore", over="ignore"):
-            mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
-            squared_distance = np.maximum(np.sum(counts * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
-        return squared_distance, counts.sum(axis=1)
+            squared_distance = np.maximum(np.sum(squared_sketch_distance(poses, sums), axis=1), 0.0)
+        return squared_distance, sums[0].sum(axis=1)
 
 
 class _ShownFrames(NamedTuple):

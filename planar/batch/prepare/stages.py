@@ -28,7 +28,7 @@ from planar.batch.march.designs_writer import (
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelBlock, KernelEquations, Operand, operand_rows
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
+from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart, write_squared_distance
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
     CORRECTIONS_COLUMN,
@@ -169,23 +169,17 @@ class _StartWriter(BlockJoinWriter):
         for k, part in enumerate(self.equations.blocks):
             if k < self.enumerated:
                 have["sign", k] = t.constants([1.0 if lane >> k & 1 else -1.0 for lane in range(t.lanes)])
-                coalescence = self.write_closed_form(part, have)
-                self._add_block(k, coalescence, self._write_distance(part, have))
+                coalescence, distance = self.write_closed_form(part, have), self.write_distance(part, have)
             else:
-                self._write_nearer(part, k, have)
+                _, distance, other_distance, coalescence = self.write_block(part, have)
+                farther = t.binary("add", self.total, other_distance)
+                is_joined = t.compare("olt", coalescence, t.constant(MEETING_COSINE_SQUARED))
+                farther = t.select(is_joined, farther, t.constant(inf))
+                self.otherwise = t.call_intrinsic("minnum", self.otherwise, farther)
+            self._add_block(k, coalescence, distance)
         self._write_choice(have)
         t.end_function()
         return t
-
-    def _write_nearer(self, part: KernelBlock, k: int, have: OperandNames) -> None:
-        """A block in the nearer of its assemblies."""
-        t = self.ir
-        block = self.write_block(part, have, "zeroinitializer")
-        have["sign", k] = block.sign
-        farther = t.binary("add", self.total, block.other_distance)
-        is_joined = t.compare("olt", block.coalescence, t.constant(MEETING_COSINE_SQUARED))
-        self.otherwise = t.call_intrinsic("minnum", self.otherwise, t.select(is_joined, farther, t.constant(inf)))
-        self._add_block(k, block.coalescence, block.distance)
 
     def _add_block(self, k: int, coalescence: str, distance: str) -> None:
         """Add a block: to lanes in which it is joined, in which it may be, and in which it cannot be."""
@@ -543,8 +537,11 @@ class _NewtonWriter:
         t, blocks = self.ir, self.design.sketched_blocks
         sketch = [*load_numbers(t, self.order, "sketch").values()]
         costs, other_costs = (
-            [self._write_squared_distance(out, first + 2 * k, sketch[2 * k : 2 * k + 2]) for k in range(len(blocks))]
-            for first in (0, 2 * len(blocks))
+            [
+                write_squared_distance(t, [self._row(out, first + k + axis) for axis in range(2)], sketch[k : k + 2])
+                for k in range(0, len(sketch), 2)
+            ]
+            for first in (0, len(sketch))
         )
         converged = t.compare("ogt", t.load(good), t.constant(0.0))
         regularity = self._row(out, self.first_state + len(self.corrector.state))
@@ -576,11 +573,6 @@ class _NewtonWriter:
                 is_nearest = t.and_flags(t.and_flags(is_nearest, is_regular), is_first)
             earlier_cost = t.add_instruction(f"fadd {t.vector} {earlier_cost}, {first_cost}")
         return t.add_instruction(f"extractelement <{LANES} x i1> {is_nearest}, i64 0")
-
-    def _write_squared_distance(self, out: str, row: int, target: Sequence[str]) -> str:
-        t = self.ir
-        gaps = [t.binary("sub", self._row(out, row + axis), target[axis]) for axis in range(2)]
-        return t.add_all([t.binary("mul", gap, gap) for gap in gaps])
 
     def _write_least_other(
         self, part: KernelBlock, out: str, converged: str, assemblies: tuple[int, range], cost: str
