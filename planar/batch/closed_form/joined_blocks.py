@@ -52,7 +52,7 @@ class BlockJoinWriter(KernelWriter):
         point_blocks: tuple[int, ...] | None,
         lanes: int = LANES,
     ):
-        super().__init__(equations, links, False, lanes, frozenset(), frozenset())
+        super().__init__(equations, links, False, lanes)
         self.point_blocks = point_blocks
 
     def write_block(

@@ -17,17 +17,15 @@ from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, O
 from planar.batch.march.kernel_writer import (
     KernelWriter,
     OperandNames,
-    result_pointers,
-    store_results,
     write_angle_sum,
-    write_closes,
     write_keeps_apart,
-    write_turns_little,
+    write_residual_sum,
 )
 from planar.batch.march.prediction import (
     LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     LEAST_START_REGULARITY,
+    MAX_TURN_PER_STEP,
     TABLE_COLUMNS,
     least_regularity,
 )
@@ -326,12 +324,16 @@ class _DesignsKernelWriter(KernelWriter):
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged; `flags` judge what lies before it."""
-        t, results, between_count = self.ir, self.results, len(flags)
+        t, results, between_count, flags = self.ir, self.results, len(flags), [*flags]
         scale, expressions = self.symbols["scale"], self.output_expressions() if results is None else []
         self._write_rates(have)
         judged = [self.equations.residuals(), self.counted_angles()]
         residuals, counted, *columns = self.write_separately([*judged, *(row * scale for row in expressions)], have)
-        flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
+        for angle, slot in zip(counted, self.counted_angle_slots, strict=True):
+            turn = t.call_intrinsic("fabs", t.binary("sub", angle, t.load(slot)))
+            t.store(angle, slot)
+            is_near = t.compare("ole", turn, t.constant(MAX_TURN_PER_STEP))
+            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", 0)))
         outputs = [value for column in columns for value in column]
         if results is not None:
             outputs = results.write_rows(self, have)
@@ -339,17 +341,24 @@ class _DesignsKernelWriter(KernelWriter):
             nowhere = [t.constant(inf)] * 2
             outputs += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             outputs += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        flags.append(write_closes(t, [*residuals, *self.write_circle_residuals(have)], "%tolerance"))
+        residual = write_residual_sum(t, [*residuals, *self.write_circle_residuals(have)])
+        flags.append(t.compare("ole", residual, t.broadcast("%tolerance")))
         if self.newton_unknowns:
             minimum = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(minimum)))
             flags.append(self.write_is_as_predicted())
         passed = [self.write_passed(flags, self.passed_slot)]
-        pointers = result_pointers(t, self.lane, len(outputs), self.request.is_single)
+        first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {self.lane}")
+        rows = [t.add_instruction(f"mul i64 %row, {k}") for k in range(len(outputs))]
+        pointer, store = t.double_pointer, t.store_streaming if self.request.streams else t.store
+        if self.request.is_single:
+            pointer, store = t.single_pointer, t.store_streaming_rounded
+        pointers = [pointer("%out", t.add_instruction(f"add i64 {first}, {row}")) for row in rows]
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
         t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
         t.write_label("whole")
-        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
+        for value, place in zip(outputs, pointers, strict=True):
+            store(value, place)
         t.write_line("br label %stepend")
         t.write_label("judged")
         if self.request.counts_candidates:
@@ -357,7 +366,8 @@ class _DesignsKernelWriter(KernelWriter):
             passed.append(self.write_passed(candidate_flags, self.candidate_slot))
         if self.request.point_blocks is None:
             outputs = [t.select(passed[-1][1], value, t.constant(nan)) for value in outputs]
-        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
+        for value, place in zip(outputs, pointers, strict=True):
+            store(value, place)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
         for (_, slot, _), (previous, current) in zip(self._counted(), passed, strict=True):
             t.store(t.select(current, t.load(slot), t.select(previous, step, t.load(slot))), slot)

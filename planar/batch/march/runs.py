@@ -11,7 +11,6 @@ import numpy as np
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import (
-    CorrectedAssemblies,
     DesignBatch,
     erase_between,
     erase_from_steps,
@@ -218,8 +217,15 @@ def lead_designs(batch: DesignBatch, index: int, span: Array, step: float) -> tu
     return z, passed
 
 
-def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
-    """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
+def correct_designs(
+    batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Correct designs from unknowns near by, at the inputs where they start. Raises UnsupportedOperation.
+
+    Return which designs converge, the regularity of the least regular block that Newton's method solves (the volume
+    that the columns of its Jacobian span) (designs,), the unknowns (unknowns, designs), the points of the batch, and
+    the same in the other assembly of their block, infinite where that is not known (points, 2, designs), in sizes.
+    """
     kernel = designs_kernel(
         KernelRequest(batch_equations(batch), tuple(batch.links), False, LANES, tuple(point_blocks))
     )
@@ -229,7 +235,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
     rows, places = out[0], 2 * len(batch.links)
     z = unknowns_from_state(kernel.state, rows[2 * places : -1], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
-    return CorrectedAssemblies(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
+    return good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both
 
 
 def _common_inputs(u0: Array) -> Array | None:

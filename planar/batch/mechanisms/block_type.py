@@ -18,6 +18,7 @@ from planar.batch.march.kernel_writer import (
     write_nearest,
     write_normalised,
     write_rational_rotation,
+    write_residual_sum,
 )
 from planar.batch.march.prediction import LEAST_COSINE, TABLE_COLUMNS
 from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
@@ -193,8 +194,6 @@ def linear_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     return ClosedForm(tuple((value,) for value in ca.vertsplit(values)), no_sign, no_sign, coalescence, lengths)
 
 
-NAN_PROBE = 1e-300
-"""A number times it is negligible beside round-off; NaN and infinity times it are not."""
 FAR_AWAY = 1e300
 """A squared distance, greater than any residual of an assembly."""
 
@@ -203,7 +202,7 @@ class _BlockTypeWriter(KernelWriter):
     """Writes the functions of a block type."""
 
     def __init__(self, block_type: BlockType, lanes: int):
-        super().__init__(block_type.kernel, (), False, lanes, frozenset({"p", "pc", "ps"}), frozenset())
+        super().__init__(block_type.kernel, (), False, lanes, frozenset({"p", "pc", "ps"}))
         self.block_type, self.text = block_type, BlockText(self.ir)
         first = block_type.slot_count - len(block_type.inner_links)
         self.inner_slots = range(first, block_type.slot_count)
@@ -302,7 +301,7 @@ class _BlockTypeWriter(KernelWriter):
 
     def _write_links(self, names: OperandNames, rates: bool = False) -> tuple[list[list[str]], str]:
         """The rows of the inner links: their poses, each followed by its rates if they are wanted: x', y', angle', then
-        the second ones; and the largest residual."""
+        the second ones; and the sum of the residuals."""
         t, e, s, links = self.ir, self.equations.equations, self.symbols, self.block_type.inner_links
         poses = ca.vertcat(*(ca.SX(part) for link in links for part in self.equations.frames[link][:POSE_ROWS]))
         outputs: list[ca.SX] = [self.equations.residuals(), poses]
@@ -315,12 +314,7 @@ class _BlockTypeWriter(KernelWriter):
             [value for k, order in enumerate(orders) for value in _part_of(order, link, 3 if k else POSE_ROWS)]
             for link in range(len(links))
         ]
-        largest = total = t.constant(0.0)
-        for residual in (*residuals, *self.write_circle_residuals(names)):
-            size = t.call_intrinsic("fabs", residual)
-            largest, total = t.call_intrinsic("maxnum", largest, size), t.binary("add", total, size)
-        # NaN stays in a sum, but not in the largest
-        return rows, t.binary("add", largest, t.binary("mul", t.constant(NAN_PROBE), total))
+        return rows, write_residual_sum(t, [*residuals, *self.write_circle_residuals(names)])
 
     def write_start(self) -> None:
         """The start: all assembly modes, and of them the nearest to the sketch."""

@@ -19,7 +19,8 @@ import numpy as np
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.kernel import KernelInstructions, Operand
+from planar.batch.march.kernel import Operand
+from planar.batch.march.kernel_writer import KernelWriter
 from planar.batch.march.runs import run_designs
 from planar.batch.named_results.design_forces import position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
@@ -226,7 +227,7 @@ class _SlopeWriter:
 
     def __init__(self, rows: SlopeRows, writer: Any):
         self.rows, self.writer, self.changes = rows, writer, rows.changes
-        kernel: KernelInstructions = writer
+        kernel: KernelWriter = writer
         e, s = kernel.equations.equations, kernel.symbols
         self.kernel, self.count = kernel, e.z.numel()
         self.unknowns = [e.z, s["z1"], s["z2"]][: rows.orders]

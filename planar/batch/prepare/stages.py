@@ -28,7 +28,13 @@ from planar.batch.march.designs_writer import (
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelBlock, KernelEquations, Operand, operand_rows
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart, write_squared_distance
+from planar.batch.march.kernel_writer import (
+    KernelWriter,
+    OperandNames,
+    write_keeps_apart,
+    write_residual_sum,
+    write_squared_distance,
+)
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
     CORRECTIONS_COLUMN,
@@ -226,7 +232,7 @@ class _PositionsWriter(KernelWriter):
     def __init__(self, design: DesignNumbers, links: tuple[str, ...] | None, rates: bool, order: tuple[Operand, ...]):
         invariant = frozenset({"p", "q", "u1", "u2", "sign", "stop"})
         rates = rates and links is not None
-        super().__init__(design.equations("q"), links or (), rates, LANES, invariant, frozenset())
+        super().__init__(design.equations("q"), links or (), rates, LANES, invariant)
         self.order, self.tells_states = order, links is None
 
     def write_stage(self, constants: Mapping[str, Any]) -> tuple[int, int]:
@@ -258,8 +264,7 @@ class _PositionsWriter(KernelWriter):
         residuals, angles, *orders = self.write_separately(
             [equations.residuals(), self.counted_angles(), *self.output_expressions()], have
         )
-        magnitudes = [t.call_intrinsic("fabs", each) for each in (*residuals, *self.write_circle_residuals(have))]
-        residual = t.add_all([t.constant(0.0), *magnitudes])
+        residual = write_residual_sum(t, [*residuals, *self.write_circle_residuals(have)])
         results = [t.binary("mul", have["unit", 0], value) for order in orders for value in order]
         if self.tells_states:
             results = [have[operand] for operand in self.state_operands()]
