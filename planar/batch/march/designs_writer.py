@@ -31,8 +31,7 @@ from planar.batch.march.prediction import (
 )
 from planar.codegen.tape import LinkDirection, write_turn_flags
 from planar.equations.closed_form import ClosedForm
-from planar.equations.linear import solve_by_determinants
-from planar.equations.rates import UnknownRates, block_jacobian
+from planar.equations.rates import UnknownRates
 from planar.foundation.instruction_list import UnsupportedOperation
 
 MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table")
@@ -295,23 +294,14 @@ class _DesignsKernelWriter(KernelWriter):
         """
         if not (self.rates and self.solves_rates_apart):
             return
-        t, e, s = self.ir, self.equations.equations, self.symbols
+        e, s = self.equations.equations, self.symbols
         rates, y1, y2 = UnknownRates(e), ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])
         right_sides = zip(rates.right_sides(y1), rates.right_sides(y1, y2), strict=True)
         for part, (first, second) in zip(self.equations.blocks, right_sides, strict=True):
-            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-            if part.is_large:
-                assert self.linear_systems is not None
-                self.linear_systems.factorise(self.write_values([ca.vec(jacobian)], have), len(part.unknowns))
+            self.factorise_block(part, have)
             for name, right_side in (("z1", first), ("z2", second)):
-                if part.is_large and self.linear_systems is not None:
-                    solution = self.linear_systems.solve(self.write_values([right_side], have))
-                else:
-                    solution = self.write_values([solve_by_determinants(jacobian, right_side)], have)
-                have |= {
-                    (name, k): t.add_instruction(f"fneg {t.vector} {value}")
-                    for k, value in zip(part.unknowns, solution, strict=True)
-                }
+                (solution,) = self.solve_block(part, [right_side], have)
+                have |= {(name, k): value for k, value in zip(part.unknowns, solution, strict=True)}
 
     def write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""

@@ -21,7 +21,7 @@ from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.closed_form import ClosedForm
 from planar.equations.generic_evaluation import inline_function
-from planar.equations.linear import solve_with_volume
+from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import block_jacobian, first_and_second_rates
 from planar.foundation.geometry import Vector
 from planar.foundation.instruction_list import InstructionList, required_values
@@ -352,6 +352,24 @@ class KernelWriter:
         assert self.linear_systems is not None
         volume = self.linear_systems.factorise(values[count:-1], count)
         return [*self.linear_systems.solve(values[:count]), volume, self.ir.constant(1.0), values[-1]]
+
+    def factorise_block(self, part: KernelBlock, names: OperandNames) -> None:
+        """Factorise the Jacobian of a large block, whose systems `solve_block` solves in numbers."""
+        if part.is_large:
+            assert self.linear_systems is not None
+            jacobian = block_jacobian(self.equations.equations, part.block.rows, part.block.unknowns)
+            self.linear_systems.factorise(self.write_values([ca.vec(jacobian)], names), len(part.unknowns))
+
+    def solve_block(self, part: KernelBlock, right_sides: Sequence[ca.SX], names: OperandNames) -> list[list[str]]:
+        """Minus the inverse of a block's Jacobian times right sides, as of rates."""
+        t = self.ir
+        if part.is_large:
+            assert self.linear_systems is not None
+            solutions = [self.linear_systems.solve(side) for side in self.write_separately(right_sides, names)]
+        else:
+            jacobian = block_jacobian(self.equations.equations, part.block.rows, part.block.unknowns)
+            solutions = self.write_separately([solve_by_determinants(jacobian, side) for side in right_sides], names)
+        return [[t.add_instruction(f"fneg {t.vector} {value}") for value in solution] for solution in solutions]
 
     def load_numbers(self) -> OperandNames:
         """Load the numbers of pairs and of stops, which follow in the rows of p, and of points, from q."""

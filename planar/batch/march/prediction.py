@@ -26,6 +26,10 @@ CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
 
 
+CORRECTIONS, FIRST_CORRECTIONS = 2, 10
+"""Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
+
+
 def correction_limit(step: float) -> float:
     """rad or sizes by which Newton's method may correct what was predicted, where inputs go so far in a step."""
     return min(CORRECTION_LIMIT * max(1.0, step / COARSE_STEP) ** 2, MAX_CORRECTION_LIMIT)
@@ -36,7 +40,9 @@ def longest_step(offsets: Array) -> float:
     return float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
 
 
-def step_table(steps: int, step: float, corrections: int, first_corrections: int) -> Array:
+def step_table(
+    steps: int, step: float, corrections: int = CORRECTIONS, first_corrections: int = FIRST_CORRECTIONS
+) -> Array:
     """The row of every step (steps, TABLE_COLUMNS), whose inputs go as far as `step` in one.
 
     The weights are those of the polynomial through the positions before, the newest first, as many as there are. The

@@ -44,7 +44,7 @@ REFINED_STEP = 0.12
 """rad or sizes to which steps are divided that are too long."""
 MAX_DIVIDED_NUMBERS = 2**23
 """Numbers of divided steps that are kept at once."""
-CORRECTIONS, FIRST_CORRECTIONS = 1, 6
+RUN_CORRECTIONS, FIRST_RUN_CORRECTIONS = 1, 6
 """Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
 COARSE_STEPS = (COARSE_STEP, 0.12)
 """rad or sizes: from each of these steps of the inputs on, the prediction takes one more step of Newton's method."""
@@ -308,9 +308,9 @@ def _run_table(content: bytes, shape: tuple[int, int]) -> Array:
     """The table of offsets (steps + 1, inputs) as bytes: the blocks of a sweep have them in common."""
     offsets = np.frombuffer(content).reshape(shape)
     longest = longest_step(offsets)
-    corrections = CORRECTIONS + sum(longest > step for step in COARSE_STEPS)
+    corrections = RUN_CORRECTIONS + sum(longest > step for step in COARSE_STEPS)
     inputs = np.stack([offsets, np.cos(offsets), np.sin(offsets)], axis=2).reshape(len(offsets), -1)
-    table = np.hstack([step_table(len(offsets), longest, corrections, FIRST_CORRECTIONS), inputs])
+    table = np.hstack([step_table(len(offsets), longest, corrections, FIRST_RUN_CORRECTIONS), inputs])
     # a step that fails condemns the one before too, so the first full prediction need not be near
     table[PREDICTOR_ORDER : PREDICTOR_ORDER + 1, LIMIT_COLUMN] = inf
     return table

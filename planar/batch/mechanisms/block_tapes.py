@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -45,8 +45,6 @@ RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)
 """Kinds of the blocks of a tape: types of blocks of links come last."""
 INPUT_NUMBERS = 5
 """Numbers of an input: its position (rad or sizes), cosine and sine of it, its velocity and acceleration."""
-CORRECTIONS, FIRST_CORRECTIONS = 2, 10
-"""Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
 LEAST_CLEARANCE = 1e-4
 """Minimum distance measure from a dead point of an assembly that is taken."""
 
@@ -107,8 +105,7 @@ def make_block_kinds(types: Sequence[BlockType], rates: bool, is_start: bool = F
         return kind.start_function if is_start and kind.has_closed_form else kind.run_function(rates, polished)
 
     has_newton_blocks = not all(kind.has_closed_form for kind in types)
-    table = partial(step_table, corrections=CORRECTIONS, first_corrections=FIRST_CORRECTIONS)
-    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, table if has_newton_blocks else None)
+    return BlockKinds(compile_kind, _pose_rows(rates), {COS: 1.0}, step_table if has_newton_blocks else None)
 
 
 def _pose_rows(rates: bool) -> int:
