@@ -145,8 +145,8 @@ class _DesignsKernelWriter(KernelWriter):
                 flags.append(self._write_closed_form_block(part, have))
         flags += self._write_stops(have)
         flags += self._write_turns(have)
-        t.write_line("br label %told")
-        t.write_label("told")
+        t.write_line("br label %checks")
+        t.write_label("checks")
         self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
@@ -304,7 +304,7 @@ class _DesignsKernelWriter(KernelWriter):
                 have |= {(name, k): value for k, value in zip(part.unknowns, solution, strict=True)}
 
     def write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
-        """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
+        """How regular a Jacobian is, if the kernel returns that; else below zero if it is not regular enough."""
         t = self.ir
         if self.request.point_blocks is not None:
             return super().write_regularity(volume, lengths, squared_arm, count)
@@ -345,8 +345,8 @@ class _DesignsKernelWriter(KernelWriter):
             pointer, store = t.single_pointer, t.store_streaming_rounded
         pointers = [pointer("%out", t.add_instruction(f"add i64 {first}, {row}")) for row in rows]
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
-        t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
-        t.write_label("whole")
+        t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %passed, label %judged")
+        t.write_label("passed")
         for value, place in zip(outputs, pointers, strict=True):
             store(value, place)
         t.write_line("br label %stepend")

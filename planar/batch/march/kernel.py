@@ -15,7 +15,6 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.stops import are_periodic, stop_rooms
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
@@ -24,7 +23,6 @@ from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates
 from planar.equations.residuals import (
     closing_error,
-    input_positions,
     residuals,
     scalars,
     split_pair_numbers,
@@ -146,12 +144,6 @@ class KernelEquations:
         numbers, inputs = split_pair_numbers(self.mechanism.pairs, e.p), scalars(e.u)[3 * len(self.given_links) :]
         rows = residuals(self.mechanism, self.frames, numbers, self.pair_coordinates, inputs)
         return ca.vertcat(ca.SX(0, 1), *(closing_error(value, row.kind) for row, value in rows))
-
-    def stop_coalescences(self, numbers: ca.SX) -> ca.SX:
-        """For each pair with stops what reaches one where it meets one of them; see `StopLimits`."""
-        positions = input_positions(self.stop_pairs, self.frames, {}, self.pair_coordinates)
-        periodic = are_periodic(self.stop_pairs, self.mechanism)
-        return ca.vertcat(ca.SX(0, 1), *(1.0 - room for room in stop_rooms(positions, periodic, scalars(numbers), ca)))
 
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """First and second rates of the unknowns, block after block."""

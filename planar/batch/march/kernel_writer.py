@@ -15,7 +15,7 @@ from planar.batch.march.prediction import (
     PREDICTOR_ORDER,
     TABLE_COLUMNS,
 )
-from planar.batch.march.stops import NUMBERS_PER_STOP
+from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
 from planar.codegen.instructions import CosSin, InvariantHoister, check_length, expand_angle_sums
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.llvm_linear import LinearSystems
@@ -23,6 +23,7 @@ from planar.equations.closed_form import ClosedForm
 from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import block_jacobian, first_and_second_rates
+from planar.equations.residuals import input_positions, scalars
 from planar.foundation.geometry import Vector
 from planar.foundation.instruction_list import InstructionList, required_values
 from planar.model.mechanism import links_counting_turns
@@ -380,10 +381,13 @@ class KernelWriter:
         return {(kind, k): self.load_entry(base, row) for kind, k, base, row in rows}
 
     def write_stops(self, names: OperandNames) -> list[str]:
-        """What reaches one where a pair meets its stop, of each pair with stops."""
-        if not self.equations.stop_pairs:
+        """For each pair with stops what reaches one where it meets one of them, see `StopLimits`."""
+        e = self.equations
+        if not e.stop_pairs:
             return []
-        return self.write_values([self.equations.stop_coalescences(self.symbols["stop"])], names)
+        positions = input_positions(e.stop_pairs, e.frames, {}, e.pair_coordinates)
+        rooms = stop_rooms(positions, are_periodic(e.stop_pairs, e.mechanism), scalars(self.symbols["stop"]), ca)
+        return self.write_values([1.0 - room for room in rooms], names)
 
     def write_slow_nearness(self, part: KernelBlock, names: OperandNames) -> str:
         """What varies as slowly as the links that hold a block in closed form, and reaches one, as a cosine minus one
