@@ -213,7 +213,7 @@ class _Slide(NamedTuple):
 
 
 def _unknowns_from_frames(kind: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> tuple[Array, BoolArray]:
-    """The unknowns of blocks whose links are shown so (blocks, unknowns), and whether those of a block are (blocks,), by
+    """The unknowns of blocks whose links are shown (blocks, unknowns), and whether those of a block are (blocks,), by
     p (blocks, numbers). Lengths of slides are read off the frames, in which they are linear."""
     slides, first = list[_Slide](), 0
     for pair in kind.mechanism.pairs:
