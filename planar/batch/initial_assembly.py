@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, find_joiner
 from planar.batch.march.checks import column_volume
-from planar.batch.march.design_batch import CorrectedAssemblies, DesignBatch
+from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import unknowns_from_state
 from planar.batch.march.prediction import CLEAR_REGULARITY
 from planar.batch.march.runs import correct_designs
@@ -216,37 +216,36 @@ class _NearReferenceSearch:
 
     def search(self) -> DesignAssemblies:
         """See `find_assemblies`."""
-        corrected = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
-        points = corrected.points, corrected.other_points
+        clear, regularity, z, *points = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in points)
-        clear, total, previous = corrected.converged.copy(), costs.sum(axis=0), np.zeros(len(corrected.converged))
+        total, previous = costs.sum(axis=0), np.zeros(len(clear))
         for block in self.blocks:
             rows = np.array(self.point_blocks) == block.block_index
             cost, other, point_count = costs[rows].sum(axis=0), others[rows].sum(axis=0), int(rows.sum())
             if np.all(np.isinf(other)):
-                clear &= is_at_sketch(cost, point_count, NEAR_SKETCH) & (corrected.regularity > CLEAR_REGULARITY)
+                clear &= is_at_sketch(cost, point_count, NEAR_SKETCH) & (regularity > CLEAR_REGULARITY)
                 near = is_at_sketch(cost, point_count)
                 if not near.all():
-                    near |= is_surely_farther(previous + self._next_cost(block, corrected, rows), total)
+                    near |= is_surely_farther(previous + self._next_cost(block, z[block.unknowns], rows), total)
                 clear &= near
             else:
                 clear &= is_surely_farther(previous + other, total)
             previous += cost
-        return DesignAssemblies(corrected.z, clear, np.full(len(clear), -1))
+        return DesignAssemblies(z, clear, np.full(len(clear), -1))
 
-    def _next_cost(self, block: Block, corrected: CorrectedAssemblies, rows: Array) -> Array:
-        """The least cost of a block's other assemblies (designs,), minus infinity where not as many are found as the
-        base has; `rows` are the block's points."""
+    def _next_cost(self, block: Block, unknowns: Array, rows: Array) -> Array:
+        """The least cost of a block's assemblies other than that with these unknowns (unknowns, designs), minus
+        infinity where there are fewer of them than in the base; `rows` are the block's points."""
         roots, base_count = self.roots[block.block_index]
-        count = np.ones(len(corrected.converged), dtype=int)
-        least, known = np.full(len(count), np.inf), [corrected.z[block.unknowns]]
+        count = np.ones(unknowns.shape[1], dtype=int)
+        least, known = np.full(len(count), np.inf), [unknowns]
         for root in roots[1:]:
             self.batch.z0[block.unknowns] = root[:, None]
-            other = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
-            z = other.z[block.unknowns]
+            converged, _, z, points, _ = correct_designs(self.batch, self.point_blocks, CORRECTIONS)
+            z = z[block.unknowns]
             gaps = distances(self.is_angle[block.unknowns], z.T, np.array(known).transpose(0, 2, 1)).max(axis=2)
-            is_new = other.converged & np.all(~(gaps <= SAME_ASSEMBLY_TOLERANCE), axis=0)
-            cost = np.square(other.points - self.sketch)[rows].sum(axis=(0, 1))
+            is_new = converged & np.all(~(gaps <= SAME_ASSEMBLY_TOLERANCE), axis=0)
+            cost = np.square(points - self.sketch)[rows].sum(axis=(0, 1))
             least = np.where(is_new, np.minimum(least, cost), least)
             count += is_new
             known.append(np.where(is_new, z, np.nan))

@@ -17,7 +17,8 @@ import casadi as ca
 import numpy as np
 
 from planar.assemblies.block_roots import complex_assemblies
-from planar.batch.march.kernel import KernelEquations, KernelInstructions, Operand, kernel_equations
+from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
+from planar.batch.march.kernel_writer import KernelWriter
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.printed_formula import PrintedFunction, compile_numpy
 from planar.equations.linear import solve_by_elimination
@@ -62,13 +63,13 @@ def compile_newton_step(equations: KernelEquations, block: Block) -> tuple[Print
     e = equations.equations
     if any(row.kind is not MeasureKind.LENGTH for row in e.rows[block.rows]):
         raise UnsupportedOperation("an angle closes modulo a turn, or counts turns")
-    instructions = KernelInstructions(equations, (), False, frozenset(), frozenset())
+    writer = KernelWriter(equations, (), False, 1)
     jacobian = block_jacobian(e, block.rows, block.unknowns)
     rng = np.random.default_rng(0)
     function = ca.Function("jacobian", [e.z, e.u, e.p], [jacobian])
     sample = function(*(rng.uniform(0.5, 2.0, symbol.numel()) for symbol in (e.z, e.u, e.p))).full()
     outputs = [solve_by_elimination(jacobian, e.F[block.rows], sample)]
-    values, listing = instructions.list_values(outputs, 0), instructions.hoister.result
+    values, listing = writer.list_values(outputs, 0), writer.hoister.result
     operands: dict[int, Operand] = {}
     for number in required_values(listing, values):
         operation, _, _, key = listing.instructions[number]

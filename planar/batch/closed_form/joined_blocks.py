@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, batch_equations, operand_rows
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames
+from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_nearest, write_squared_distance
 from planar.codegen.llvm_compile import compile_function
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.foundation.turns import leave_turn
@@ -26,8 +27,9 @@ JOINED_ROWS = 4
 
 class JoinedBlocks(NamedTuple):
     """Designs joined block after block, each array (blocks, designs): the sign of the assembly that was taken; the
-    squared distance of the block's sketched points from where they are shown (sizes), in that assembly and in the
-    other; how near the two are to where they meet, 1 there, beyond it there is none.
+    squared distance of the block's sketched points from where they are shown (sizes), in that assembly, and in the
+    other, infinite where the sign was forced; how near the two are to where they meet, 1 there, beyond it there is
+    none.
 
     state (operands, designs): the unknowns as the kernel's operands, cos and sin of angles. What comes after a block
     that cannot be joined is no number.
@@ -40,15 +42,6 @@ class JoinedBlocks(NamedTuple):
     state: Array
 
 
-class StartBlock(NamedTuple):
-    """Names of what is known of a block that was joined: see `JoinedBlocks`."""
-
-    sign: str
-    distance: str
-    other_distance: str
-    coalescence: str
-
-
 class BlockJoinWriter(KernelWriter):
     """The text of the function; `point_blocks`: of the block that places each sketched point, None without a sketch."""
 
@@ -59,33 +52,39 @@ class BlockJoinWriter(KernelWriter):
         point_blocks: tuple[int, ...] | None,
         lanes: int = LANES,
     ):
-        super().__init__(equations, links, False, lanes, frozenset(), frozenset())
+        super().__init__(equations, links, False, lanes)
         self.point_blocks = point_blocks
 
-    def write_block(self, part: KernelBlock, names: OperandNames, forced: str) -> StartBlock:
-        """Join a block: its unknowns put into `names`, those of the assembly nearer to the sketch unless it is forced.
+    def write_block(
+        self, part: KernelBlock, names: OperandNames, forced: str | None = None
+    ) -> tuple[str, str, str, str]:
+        """Join a block: put into `names` the unknowns and the sign of the assembly nearer to the sketch, or of that of
+        the sign `forced` where it is not zero. Return the sign, the squared distance, that of the other assembly,
+        infinite where a sign is forced, and the coalescence.
 
         `names` has p, q, the inputs, and ("sketch", k) of where the points are shown.
         """
         t, sign_operand = self.ir, ("sign", self.sign_index[part.block.block_index])
-        options = [{**names, sign_operand: t.constant(sign)} for sign in (1.0, -1.0)]
-        coalescence, _ = (self.write_closed_form(part, option) for option in options)
-        first, second = (self._write_distance(part, option) for option in options)
-        nearer = t.select(t.compare("ole", first, second), t.constant(1.0), t.constant(-1.0))
-        sign = t.select(t.compare("oeq", forced, "zeroinitializer"), nearer, forced)
-        is_first = t.compare("ogt", sign, "zeroinitializer")
-        for operand in self.closed_form_operands(part):
-            names[operand] = t.select(is_first, *(option[operand] for option in options))
-        return StartBlock(sign, t.select(is_first, first, second), t.select(is_first, second, first), coalescence)
+        operands = [sign_operand, *self.closed_form_operands(part)]
+        assemblies = [names | {sign_operand: t.constant(sign)} for sign in (1.0, -1.0)]
+        coalescence, _ = (self.write_closed_form(part, assembly) for assembly in assemblies)
+        options = []
+        for assembly in assemblies:
+            distance = self.write_distance(part, assembly)
+            if forced is not None:
+                is_other = t.compare("olt", t.binary("mul", forced, assembly[sign_operand]), t.constant(0.0))
+                distance = t.select(is_other, t.constant(inf), distance)
+            options.append(([assembly[operand] for operand in operands], distance))
+        values, distance, other_distance = write_nearest(t, options)
+        names.update(zip(operands, values, strict=True))
+        return names[sign_operand], distance, other_distance, coalescence
 
-    def _write_distance(self, part: KernelBlock, names: OperandNames) -> str:
+    def write_distance(self, part: KernelBlock, names: OperandNames) -> str:
         """The squared distance of a block's sketched points from where they are shown."""
-        t = self.ir
         points = [k for k, block in enumerate(self.point_blocks or ()) if block == part.block.block_index]
         coordinates = self.write_values([self.point_coordinates(points)], names)
         shown = [names["sketch", 2 * k + axis] for k in points for axis in range(2)]
-        gaps = [t.binary("sub", *both) for both in zip(coordinates, shown, strict=True)]
-        return t.add_all([t.constant(0.0), *(t.binary("mul", gap, gap) for gap in gaps)])
+        return write_squared_distance(self.ir, coordinates, shown)
 
     def write(self) -> str:
         """The complete function; without a sketch it takes the assemblies of the signs and gives the state alone."""
@@ -100,7 +99,6 @@ class BlockJoinWriter(KernelWriter):
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
         names = sketch | self.load_designs()
-        names |= {("q", k): self.load_entry("%q", k) for k in range(2 * len(self.links))}
         for k, part in enumerate(self.equations.blocks):
             if self.point_blocks is None:
                 self.write_closed_form(part, names)
@@ -125,8 +123,7 @@ class BlockJoinWriter(KernelWriter):
         first = t.add_instruction(f"mul i64 %b, {t.lanes}")
         past = t.add_instruction(f"icmp sgt i64 {first}, %last")
         self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
-        names: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
-        names |= self.stop_number_names(lambda k: self.load_entry("%p", k))
+        names = self.load_numbers()
         names |= {operand: self.load_entry("%drive", k) for k, operand in enumerate(self.equations.input_operands)}
         return names | {("sign", k): self.load_entry("%sign", k) for k in range(len(self.equations.blocks))}
 

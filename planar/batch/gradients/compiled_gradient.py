@@ -19,7 +19,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.batch.march.kernel import KernelInstructions, Operand
+from planar.batch.march.kernel import Operand
 from planar.batch.march.kernel_writer import KernelWriter, OperandNames
 from planar.batch.prepare.compiled_runs import (
     LANES,
@@ -61,7 +61,7 @@ class WeightedRow(NamedTuple):
     point: int
 
 
-def adjoint_expressions(kernel: KernelInstructions, rows: Sequence[WeightedRow], weights: ca.SX) -> list[ca.SX]:
+def adjoint_expressions(kernel: KernelWriter, rows: Sequence[WeightedRow], weights: ca.SX) -> list[ca.SX]:
     """A sum (sizes, s) of rows with weights (2 rows,), and its derivatives in p, q, u, and the rates u' and u''."""
     e, s = kernel.equations.equations, kernel.symbols
     depth = 1 + max(row.order for row in rows)

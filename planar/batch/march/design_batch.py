@@ -92,21 +92,6 @@ class DesignBatch(NamedTuple):
         return self._replace(**parts | more | ({} if z0 is None else {"z0": z0}))
 
 
-class CorrectedAssemblies(NamedTuple):
-    """Where designs are that were corrected from near by.
-
-    `converged` (designs,), and how regular the least regular is of the blocks that Newton's method solved (the volume
-    that the columns of its Jacobian span) (designs,); the unknowns z (unknowns, designs); the points of the batch, and
-    the same in the other assembly of their block, infinite where that is not known (points, 2, designs), in sizes.
-    """
-
-    converged: Array
-    regularity: Array
-    z: Array
-    points: Array
-    other_points: Array
-
-
 def erase_from_steps(out: Array, first: Array) -> None:
     """Make out (steps + 1, rows, designs) no number from a step of each design on (designs,)."""
     begin = int(first.min(initial=len(out)))

@@ -17,30 +17,27 @@ from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, O
 from planar.batch.march.kernel_writer import (
     KernelWriter,
     OperandNames,
-    result_pointers,
-    store_results,
     write_angle_sum,
-    write_closes,
     write_keeps_apart,
-    write_turns_little,
+    write_residual_sum,
 )
 from planar.batch.march.prediction import (
     LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     LEAST_START_REGULARITY,
-    PREDICTOR_ORDER,
+    MAX_TURN_PER_STEP,
+    TABLE_COLUMNS,
     least_regularity,
 )
 from planar.codegen.tape import LinkDirection, write_turn_flags
 from planar.equations.closed_form import ClosedForm
-from planar.equations.linear import solve_by_determinants
-from planar.equations.rates import UnknownRates, block_jacobian
+from planar.equations.rates import UnknownRates
 from planar.foundation.instruction_list import UnsupportedOperation
 
-MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table", "counts")
-MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, *("array",) * 3)
+MARCH_FUNCTION, _READ_ARRAYS = "march", ("p", "q", "state", "drive", "rate", "table")
+MARCH_ARGUMENTS = (*("int",) * 5, *("array",) * 6, *("float",) * 2, *("array",) * 3)
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
-from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good, candidates."""
+from the next; p, q, state, drives, rates, table; tolerance, scale; out, good, candidates."""
 INVARIANT_KINDS = frozenset({"p", "q", "u1", "u2", "scale", "stop", "number"})
 """Of operands that are the same at all steps of a design."""
 
@@ -122,7 +119,7 @@ class _DesignsKernelWriter(KernelWriter):
         rows = 2 * len(self.links) * (3 if self.rates else 1) if self.results is None else self.results.row_count
         rows += 0 if self.request.point_blocks is None else 2 * len(self.links) + len(self.state) + 1
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in _READ_ARRAYS)
-        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "astray", "scale"))
+        numbers = ", ".join(f"double %{name}" for name in ("tolerance", "scale"))
         written = ", ".join(f"ptr noalias %{name}" for name in ("out", "good", "candidates"))
         sizes = ", ".join(f"i64 %{name}" for name in ("blocks", "steps", "width", "row", "time"))
         t.write_line(f"define void @{MARCH_FUNCTION}({sizes}, {arrays}, {numbers}, {written}) {{")
@@ -143,13 +140,13 @@ class _DesignsKernelWriter(KernelWriter):
         flags = []
         for part in self.equations.blocks:
             if part.closed_form is None:
-                self._write_newton_block(part, have)
+                self.write_newton_block(part, have)
             else:
                 flags.append(self._write_closed_form_block(part, have))
         flags += self._write_stops(have)
         flags += self._write_turns(have)
-        t.write_line("br label %told")
-        t.write_label("told")
+        t.write_line("br label %checks")
+        t.write_label("checks")
         self._write_step_end(have, flags)
         t.close_loop("k", "steps", "step", "blockend")
         t.write_label("blockend")
@@ -170,9 +167,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label("block")
         t.write_line("%b = phi i64 [0, %entry], [%bnext, %blockend]")
         self.lane = t.add_instruction(f"mul i64 %b, {t.lanes}")
-        have: OperandNames = {("p", k): self.load_entry("%p", k) for k in range(self.symbols["p"].numel())}
-        have |= self.stop_number_names(lambda k: self.load_entry("%p", k))
-        have |= {("q", k): self.load_entry("%q", k) for k in range(2 * len(self.links))}
+        have = self.load_numbers()
         if self.results is not None:
             first = 2 * len(self.links)
             have |= {("number", k): self.load_entry("%q", first + k) for k in range(self.results.numbers.numel())}
@@ -202,18 +197,11 @@ class _DesignsKernelWriter(KernelWriter):
         t = self.ir
         t.write_label("step")
         t.write_line("%k = phi i64 [0, %block], [%knext, %stepend]")
-        begin = t.add_instruction(f"mul i64 %k, {PREDICTOR_ORDER + 3 * self.input_count}")
-
-        def tabled(k: int) -> str:
-            return t.broadcast(
-                t.add_instruction(
-                    f"load double, ptr {t.double_pointer('%table', t.add_instruction(f'add i64 {begin}, {k}'))}"
-                )
-            )
-
-        self.predictor_weights = [tabled(k) for k in range(PREDICTOR_ORDER)] if self.newton_unknowns else []
+        begin = t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS + 3 * self.input_count}")
+        row = t.double_pointer("%table", begin)
         for k, turns in enumerate(self.equations.input_is_angle):
-            by, cos, sin = (tabled(PREDICTOR_ORDER + 3 * k + j) for j in range(3))
+            places = [t.double_pointer(row, str(TABLE_COLUMNS + 3 * k + j)) for j in range(3)]
+            by, cos, sin = (t.broadcast(t.add_instruction(f"load double, ptr {place}")) for place in places)
             if self.request.has_common_inputs:
                 have |= {("u", k): by, ("uc", k): cos, ("us", k): sin}
                 continue
@@ -221,7 +209,8 @@ class _DesignsKernelWriter(KernelWriter):
             if turns:
                 have["uc", k], have["us", k] = write_angle_sum(t, at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.regularity_slot)
-        self.begin_newton_step()
+        if self.newton_unknowns:
+            self.begin_newton_step(row)
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> str:
         """A block in closed form; a flag that says where its two assemblies keep apart."""
@@ -296,13 +285,6 @@ class _DesignsKernelWriter(KernelWriter):
         for leaf in ("zc", "zs", "z"):
             t.store(have[leaf, k], self.state_slots[leaf, k])
 
-    def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
-        """Newton's method for a block, with as many corrections as the step has."""
-        t = self.ir
-        self.write_prediction(part)
-        count = t.add_instruction(f"load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
-        self.write_corrections(part, have, count)
-
     def _write_rates(self, have: OperandNames) -> None:
         """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers.
 
@@ -312,26 +294,17 @@ class _DesignsKernelWriter(KernelWriter):
         """
         if not (self.rates and self.solves_rates_apart):
             return
-        t, e, s = self.ir, self.equations.equations, self.symbols
+        e, s = self.equations.equations, self.symbols
         rates, y1, y2 = UnknownRates(e), ca.vertcat(s["z1"], s["u1"]), ca.vertcat(s["z2"], s["u2"])
         right_sides = zip(rates.right_sides(y1), rates.right_sides(y1, y2), strict=True)
         for part, (first, second) in zip(self.equations.blocks, right_sides, strict=True):
-            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-            if part.is_large:
-                assert self.linear_systems is not None
-                self.linear_systems.factorise(self.write_values([ca.vec(jacobian)], have), len(part.unknowns))
+            self.factorise_block(part, have)
             for name, right_side in (("z1", first), ("z2", second)):
-                if part.is_large and self.linear_systems is not None:
-                    solution = self.linear_systems.solve(self.write_values([right_side], have))
-                else:
-                    solution = self.write_values([solve_by_determinants(jacobian, right_side)], have)
-                have |= {
-                    (name, k): t.add_instruction(f"fneg {t.vector} {value}")
-                    for k, value in zip(part.unknowns, solution, strict=True)
-                }
+                (solution,) = self.solve_block(part, [right_side], have)
+                have |= {(name, k): value for k, value in zip(part.unknowns, solution, strict=True)}
 
     def write_regularity(self, volume: str, lengths: str, squared_arm: str, count: int) -> str:
-        """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
+        """How regular a Jacobian is, if the kernel returns that; else below zero if it is not regular enough."""
         t = self.ir
         if self.request.point_blocks is not None:
             return super().write_regularity(volume, lengths, squared_arm, count)
@@ -341,12 +314,16 @@ class _DesignsKernelWriter(KernelWriter):
 
     def _write_step_end(self, have: OperandNames, flags: list[str]) -> None:
         """The step ends: its results are written, and judged; `flags` judge what lies before it."""
-        t, results, between_count = self.ir, self.results, len(flags)
+        t, results, between_count, flags = self.ir, self.results, len(flags), [*flags]
         scale, expressions = self.symbols["scale"], self.output_expressions() if results is None else []
         self._write_rates(have)
         judged = [self.equations.residuals(), self.counted_angles()]
         residuals, counted, *columns = self.write_separately([*judged, *(row * scale for row in expressions)], have)
-        flags = [*flags, *write_turns_little(t, counted, self.counted_angle_slots)]
+        for angle, slot in zip(counted, self.counted_angle_slots, strict=True):
+            turn = t.call_intrinsic("fabs", t.binary("sub", angle, t.load(slot)))
+            t.store(angle, slot)
+            is_near = t.compare("ole", turn, t.constant(MAX_TURN_PER_STEP))
+            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", 0)))
         outputs = [value for column in columns for value in column]
         if results is not None:
             outputs = results.write_rows(self, have)
@@ -354,18 +331,24 @@ class _DesignsKernelWriter(KernelWriter):
             nowhere = [t.constant(inf)] * 2
             outputs += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             outputs += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        flags.append(write_closes(t, [*residuals, *self.write_circle_residuals(have)], "%tolerance"))
+        residual = write_residual_sum(t, [*residuals, *self.write_circle_residuals(have)])
+        flags.append(t.compare("ole", residual, t.broadcast("%tolerance")))
         if self.newton_unknowns:
             minimum = LEAST_KERNEL_REGULARITY**3 if self.request.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(minimum)))
-            is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
-            flags.append(t.or_flags(is_near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))
+            flags.append(self.write_is_as_predicted())
         passed = [self.write_passed(flags, self.passed_slot)]
-        pointers = result_pointers(t, self.lane, len(outputs), self.request.is_single)
+        first = t.add_instruction(f"add i64 {t.add_instruction('mul i64 %k, %time')}, {self.lane}")
+        rows = [t.add_instruction(f"mul i64 %row, {k}") for k in range(len(outputs))]
+        pointer, store = t.double_pointer, t.store_streaming if self.request.streams else t.store
+        if self.request.is_single:
+            pointer, store = t.single_pointer, t.store_streaming_rounded
+        pointers = [pointer("%out", t.add_instruction(f"add i64 {first}, {row}")) for row in rows]
         # mostly all designs pass, and are candidates too: then nothing of theirs is erased or counted
-        t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %whole, label %judged")
-        t.write_label("whole")
-        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
+        t.write_line(f"br i1 {t.all_flags(passed[0][1])}, label %passed, label %judged")
+        t.write_label("passed")
+        for value, place in zip(outputs, pointers, strict=True):
+            store(value, place)
         t.write_line("br label %stepend")
         t.write_label("judged")
         if self.request.counts_candidates:
@@ -373,7 +356,8 @@ class _DesignsKernelWriter(KernelWriter):
             passed.append(self.write_passed(candidate_flags, self.candidate_slot))
         if self.request.point_blocks is None:
             outputs = [t.select(passed[-1][1], value, t.constant(nan)) for value in outputs]
-        store_results(t, outputs, pointers, self.request.streams, self.request.is_single)
+        for value, place in zip(outputs, pointers, strict=True):
+            store(value, place)
         step = t.broadcast(t.add_instruction("sitofp i64 %k to double"))
         for (_, slot, _), (previous, current) in zip(self._counted(), passed, strict=True):
             t.store(t.select(current, t.load(slot), t.select(previous, step, t.load(slot))), slot)

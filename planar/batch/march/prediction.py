@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import comb, cos
+from math import comb, cos, inf
 from typing import TypeVar
 
 import numpy as np
@@ -20,22 +20,14 @@ COARSE_STEP = 0.04
 """rad or sizes: up to this step of the inputs the limit of what may be corrected stays as it is."""
 PREDICTOR_ORDER = 6
 """Steps before from which the next is predicted."""
-CORRECTIONS, FIRST_CORRECTIONS = 1, 6
-"""Steps of Newton's method where the run has come far enough to be predicted, and before."""
-COARSE_STEPS = (COARSE_STEP, 0.12)
-"""rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
+CORRECTIONS_COLUMN, LIMIT_COLUMN, TABLE_COLUMNS = PREDICTOR_ORDER, PREDICTOR_ORDER + 1, PREDICTOR_ORDER + 2
+"""Columns of the `step_table` after the weights: the count of corrections, and the maximum of their sum; the total."""
 CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
 
 
-def prediction_weights(steps: int) -> Array:
-    """Weights of the positions before, the newest first, in that at every step (steps, PREDICTOR_ORDER): of the
-    polynomial through those that are known; of the start at the first step."""
-    weights = np.zeros((steps, PREDICTOR_ORDER))
-    for count in range(1, PREDICTOR_ORDER + 1):
-        weights[count:, :count] = [(-1.0) ** k * comb(count, k + 1) for k in range(count)]
-    weights[:1, 0] = 1.0
-    return weights
+CORRECTIONS, FIRST_CORRECTIONS = 2, 10
+"""Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
 
 
 def correction_limit(step: float) -> float:
@@ -48,11 +40,21 @@ def longest_step(offsets: Array) -> float:
     return float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
 
 
-def correction_counts(steps: int, longest: float) -> Array:
-    """How many of Newton's steps each step of a run takes (steps,), where inputs go so far in one at most."""
-    counts = np.full(steps, CORRECTIONS + sum(longest > step for step in COARSE_STEPS), dtype=np.int64)
-    counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
-    return counts
+def step_table(
+    steps: int, step: float, corrections: int = CORRECTIONS, first_corrections: int = FIRST_CORRECTIONS
+) -> Array:
+    """The row of every step (steps, TABLE_COLUMNS), whose inputs go as far as `step` in one.
+
+    The weights are those of the polynomial through the positions before, the newest first, as many as there are. The
+    first steps, which fewer positions predict, take `first_corrections` of Newton's steps, of any length.
+    """
+    table = np.zeros((steps, TABLE_COLUMNS))
+    for count in range(1, PREDICTOR_ORDER + 1):
+        table[count:, :count] = [(-1.0) ** k * comb(count, k + 1) for k in range(count)]
+    table[:1, 0] = 1.0
+    table[:, CORRECTIONS_COLUMN], table[:, LIMIT_COLUMN] = corrections, correction_limit(step)
+    table[: PREDICTOR_ORDER + 1, CORRECTIONS_COLUMN], table[:PREDICTOR_ORDER, LIMIT_COLUMN] = first_corrections, inf
+    return table
 
 
 Number = TypeVar("Number", float, Array)

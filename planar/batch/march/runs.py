@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.checks import DesignEvaluation
 from planar.batch.march.design_batch import (
-    CorrectedAssemblies,
     DesignBatch,
     erase_between,
     erase_from_steps,
@@ -23,14 +22,15 @@ from planar.batch.march.designs_writer import (
     KernelRequest,
     write_designs_kernel,
 )
-from planar.batch.march.kernel import KernelEquations, batch_equations, operand_rows, unknowns_from_state
+from planar.batch.march.kernel import batch_equations, operand_rows, unknowns_from_state
 from planar.batch.march.prediction import (
+    COARSE_STEP,
+    CORRECTIONS_COLUMN,
+    LIMIT_COLUMN,
     LONGEST_STEP,
     PREDICTOR_ORDER,
-    correction_counts,
-    correction_limit,
     longest_step,
-    prediction_weights,
+    step_table,
 )
 from planar.codegen.llvm_compile import allocate_aligned, compile_function, is_aligned
 from planar.foundation.instruction_list import UnsupportedOperation
@@ -44,6 +44,10 @@ REFINED_STEP = 0.12
 """rad or sizes to which steps are divided that are too long."""
 MAX_DIVIDED_NUMBERS = 2**23
 """Numbers of divided steps that are kept at once."""
+RUN_CORRECTIONS, FIRST_RUN_CORRECTIONS = 1, 6
+"""Steps of Newton's method where there are enough earlier positions for a prediction, and before."""
+COARSE_STEPS = (COARSE_STEP, 0.12)
+"""rad or sizes: from each of these steps of the inputs on, the prediction takes one more step of Newton's method."""
 EXTRA_CORRECTIONS = 2
 """Further corrections at every step for designs that the usual ones leave open."""
 LANES = 16
@@ -155,18 +159,18 @@ def run_compiled(batch: DesignBatch, out: Array, candidates: Array | None = None
 
 def _run_steps(batch: DesignBatch, out: Array, candidates: Array | None, extra_corrections: int) -> Array:
     """As `run_compiled`, of steps that are short enough."""
-    equations = batch_equations(batch)
-    signs, common = _known_signs(batch, equations), _common_inputs(batch.u0)
+    equations, common = batch_equations(batch), _common_inputs(batch.u0)
+    signs = None if equations.has_newton_blocks else batch.signs
+    if signs is not None and not np.isfinite(batch.u0.sum()):  # as of a design that is not to run
+        signs = np.where(np.isfinite(batch.u0).all(axis=0), signs, np.nan)
     has_signs, has_common_inputs = signs is not None, signs is not None and common is not None
     counts = candidates is not None and not equations.has_newton_blocks
     request = KernelRequest(equations, tuple(batch.links), batch.rates, LANES, results=batch.results)
     request = request._replace(has_signs=has_signs, has_common_inputs=has_common_inputs)
     kernel = designs_kernel(request._replace(is_single=out.dtype == np.float32, counts_candidates=counts))
-    table, corrections = step_table(batch.input_offsets, common if kernel.request.has_common_inputs else None)
-    tolerances = batch.tolerance, correction_limit(longest_step(batch.input_offsets)), batch.unit
-    _, good, candidate_counts = _run_kernel(
-        kernel, batch._replace(signs=signs), (table, corrections + extra_corrections), tolerances, out
-    )
+    start = common if kernel.request.has_common_inputs else None
+    table = run_table(batch.input_offsets, start, extra_corrections)
+    _, good, candidate_counts = _run_kernel(kernel, batch._replace(signs=signs), table, batch.unit, out)
     written = candidate_counts if counts else good.copy()
     # a failure that shows only at the next step condemns the step too
     good -= (good > 1) & (good < len(table))
@@ -191,9 +195,7 @@ def unknowns_at_steps(batch: DesignBatch, steps: Array) -> Array:
     parts, offsets = _divide_steps(batch.input_offsets)
     batch = batch._replace(stops=None, input_offsets=offsets)
     kernel = designs_kernel(KernelRequest(batch_equations(batch), (), False, LANES, ()))
-    table, counts = step_table(offsets)
-    tolerances = batch.tolerance, correction_limit(longest_step(offsets)), 1.0
-    out, _, _ = _run_kernel(kernel, batch, (table, counts + EXTRA_CORRECTIONS), tolerances, None)
+    out, _, _ = _run_kernel(kernel, batch, run_table(offsets, extra_corrections=EXTRA_CORRECTIONS), 1.0, None)
     rows = out[parts * steps, : len(kernel.state), np.arange(len(steps))].T
     return unknowns_from_state(kernel.state, rows, len(batch.z0))
 
@@ -215,33 +217,25 @@ def lead_designs(batch: DesignBatch, index: int, span: Array, step: float) -> tu
     return z, passed
 
 
-def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
-    """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
+def correct_designs(
+    batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Correct designs from unknowns near by, at the inputs where they start. Raises UnsupportedOperation.
+
+    Return which designs converge, the regularity of the least regular block that Newton's method solves (the volume
+    that the columns of its Jacobian span) (designs,), the unknowns (unknowns, designs), the points of the batch, and
+    the same in the other assembly of their block, infinite where that is not known (points, 2, designs), in sizes.
+    """
     kernel = designs_kernel(
         KernelRequest(batch_equations(batch), tuple(batch.links), False, LANES, tuple(point_blocks))
     )
-    table, counts = step_table(np.zeros((1, len(batch.u0))))
-    counts[:] = corrections
-    out, good, _ = _run_kernel(kernel, batch, (table, counts), (batch.tolerance, np.inf, 1.0), None)
+    table = run_table(np.zeros((1, len(batch.u0))))
+    table[:, CORRECTIONS_COLUMN] = corrections
+    out, good, _ = _run_kernel(kernel, batch, table, 1.0, None)
     rows, places = out[0], 2 * len(batch.links)
     z = unknowns_from_state(kernel.state, rows[2 * places : -1], len(batch.z0))
     both = rows[: 2 * places].reshape(2, len(batch.links), 2, rows.shape[1])
-    return CorrectedAssemblies(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
-
-
-def _known_signs(batch: DesignBatch, equations: KernelEquations) -> Array | None:
-    """The signs (blocks, designs) of a batch's assemblies, not numbers of a design that starts nowhere; None where not
-    all blocks are in closed form, or nothing is known of them."""
-    if batch.signs is None or equations.has_newton_blocks:
-        return None
-    signs = batch.signs
-    if not np.isfinite(batch.u0.sum()):  # as where a design is not to run
-        signs = np.where(np.isfinite(batch.u0).all(axis=0), signs, np.nan)
-    if signs.all():
-        return signs
-    unknown, signs = np.flatnonzero((signs == 0.0).any(axis=0)), signs.copy()
-    signs[:, unknown] = equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
-    return signs
+    return good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both
 
 
 def _common_inputs(u0: Array) -> Array | None:
@@ -256,12 +250,12 @@ def _common_inputs(u0: Array) -> Array | None:
 def _run_kernel(
     kernel: DesignsKernelLayout,
     batch: DesignBatch,
-    tables: tuple[Array, Array],
-    tolerances: tuple[float, float, float],
+    table: Array,
+    scale: float,
     out: Array | None,
 ) -> tuple[Array, Array, Array]:
-    """The results of a kernel: out, good, candidates."""
-    request, (table, counts) = kernel.request, tables
+    """The results of a kernel, with lengths times a scale: out, good, candidates."""
+    request = kernel.request
     design_count, step_count, lanes = batch.p.shape[1], len(table), request.lanes
     function, no_rows = compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS), np.zeros((0, design_count))
     rows = (
@@ -273,12 +267,12 @@ def _run_kernel(
     )
 
     def call(rows: Sequence[Array], design_count: int, out: Array, counted: Array) -> None:
-        arrays = [np.ascontiguousarray(row) for row in (*rows, table, counts)]
+        arrays = [np.ascontiguousarray(row) for row in (*rows, table)]
         row_stride, step_stride = out.strides[1] // out.itemsize, out.strides[0] // out.itemsize
         sizes = design_count // lanes, step_count, rows[0].shape[1], row_stride, step_stride
         addresses = [array.ctypes.data for array in (*arrays, out, *counted)]
         with leave_turn(design_count * step_count >= LONG_CALL_POSITIONS):
-            function(*sizes, *addresses[: len(arrays)], *tolerances, *addresses[len(arrays) :])
+            function(*sizes, *addresses[: len(arrays)], batch.tolerance, scale, *addresses[len(arrays) :])
 
     target = out
     dtype = np.dtype(np.float64) if out is None else out.dtype
@@ -300,24 +294,23 @@ def _run_kernel(
     return out, good, candidates
 
 
-def step_table(offsets: Array, start: Array | None = None) -> tuple[Array, Array]:
-    """What every step needs to know: the weights of the steps before, and how far each input has gone, or where it is
-    if all designs `start` (inputs,) at one position."""
+def run_table(offsets: Array, start: Array | None = None, extra_corrections: int = 0) -> Array:
+    """The `step_table` of offsets of the inputs (steps + 1, inputs), then how far each input has gone, with its cos and
+    sin; or where it is, if all designs `start` (inputs,) at one position."""
     offsets = np.ascontiguousarray(offsets if start is None else offsets + start)
-    table, counts = _step_table(offsets.tobytes(), offsets.shape)
-    return table, counts.copy()
+    table = _run_table(offsets.tobytes(), offsets.shape).copy()
+    table[:, CORRECTIONS_COLUMN] += extra_corrections
+    return table
 
 
 @lru_cache(maxsize=64)
-def _step_table(content: bytes, shape: tuple[int, int]) -> tuple[Array, Array]:
-    """The same of offsets (steps + 1, inputs) as bytes: the blocks of a sweep have them in common."""
-    steps, inputs = shape
+def _run_table(content: bytes, shape: tuple[int, int]) -> Array:
+    """The table of offsets (steps + 1, inputs) as bytes: the blocks of a sweep have them in common."""
     offsets = np.frombuffer(content).reshape(shape)
-    table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
-    table[:, :PREDICTOR_ORDER] = prediction_weights(steps)
-    for k in range(inputs):
-        table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
-            [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1
-        )
-    table.flags.writeable = False
-    return table, correction_counts(steps, longest_step(offsets))
+    longest = longest_step(offsets)
+    corrections = RUN_CORRECTIONS + sum(longest > step for step in COARSE_STEPS)
+    inputs = np.stack([offsets, np.cos(offsets), np.sin(offsets)], axis=2).reshape(len(offsets), -1)
+    table = np.hstack([step_table(len(offsets), longest, corrections, FIRST_RUN_CORRECTIONS), inputs])
+    # a step that fails condemns the one before too, so the first full prediction need not be near
+    table[PREDICTOR_ORDER : PREDICTOR_ORDER + 1, LIMIT_COLUMN] = inf
+    return table

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.prediction import step_table
 from planar.batch.mechanisms.block_type import (
     COS,
     POSE_ROWS,
@@ -22,7 +23,6 @@ from planar.batch.mechanisms.block_type import (
     BlockType,
     X,
     Y,
-    step_table,
     write_formula,
 )
 from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from itertools import product
 from math import inf
 from typing import Any, NamedTuple
@@ -12,8 +12,15 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_normalised, write_rational_rotation
-from planar.batch.march.prediction import LEAST_COSINE, PREDICTOR_ORDER, correction_limit, prediction_weights
+from planar.batch.march.kernel_writer import (
+    KernelWriter,
+    OperandNames,
+    write_nearest,
+    write_normalised,
+    write_rational_rotation,
+    write_residual_sum,
+)
+from planar.batch.march.prediction import LEAST_COSINE, TABLE_COLUMNS
 from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.generic_evaluation import inline_function
@@ -80,9 +87,6 @@ MAX_SIGNS = 2
 """Maximum number of signs of a block type in closed form."""
 MAX_BLOCK_TYPES = 1024
 """Number of block types that are kept."""
-CORRECTIONS, FIRST_CORRECTIONS = 2, 10
-"""Steps of Newton's method where there are enough earlier steps for a prediction, and before."""
-TABLE_COLUMNS = PREDICTOR_ORDER + 2
 JUDGED_ROWS = 4
 """Number of rows after the signs in the result of `BlockType.start_function`."""
 
@@ -121,16 +125,16 @@ class BlockType:
         "how many blocks of its equations have two assembly modes"
         self._texts: dict[tuple[bool, bool] | None, BlockText] = {}
         has_forms = len(forms) == len(blocks) and self.sign_count <= MAX_SIGNS
-        self.has_closed_form = has_forms and self._can_be_written(blocks, (None,))
+        self.has_closed_form = has_forms and self._can_be_written(blocks, None)
         "whether all unknowns are in closed form, by functions that can be compiled"
         size = slice(0, e.z.numel())
         together = KernelBlock(Block(size, size, self.inner_links, (), False, 0), None)
-        options = (False, False), (True, False)
-        self.has_newton_functions = not self.has_closed_form and self._can_be_written([together], options)
+        # the run with rates has all instructions of the one without
+        self.has_newton_functions = not self.has_closed_form and self._can_be_written([together], (True, False))
         "whether Newton's method can follow it, where it is not in closed form"
 
-    def _can_be_written(self, blocks: Sequence[KernelBlock], options: Sequence[tuple[bool, bool] | None]) -> bool:
-        """Whether the functions of these options can be written with the equations in these blocks."""
+    def _can_be_written(self, blocks: Sequence[KernelBlock], option: tuple[bool, bool] | None) -> bool:
+        """Whether the function of an option, see `_write`, can be written with the equations in these blocks."""
         if not self.is_square:
             return False
         given = self.given_links
@@ -138,8 +142,7 @@ class BlockType:
             self.equations, self.mechanism, given_links=given, blocks=tuple(blocks), turns_numbers=True
         )
         try:
-            for option in options:
-                self._write(option)
+            self._write(option)
         except (UnsupportedOperation, BareAngle):
             return False
         return True
@@ -191,8 +194,6 @@ def linear_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     return ClosedForm(tuple((value,) for value in ca.vertsplit(values)), no_sign, no_sign, coalescence, lengths)
 
 
-NAN_PROBE = 1e-300
-"""A number times it is negligible beside round-off; NaN and infinity times it are not."""
 FAR_AWAY = 1e300
 """A squared distance, greater than any residual of an assembly."""
 
@@ -201,7 +202,7 @@ class _BlockTypeWriter(KernelWriter):
     """Writes the functions of a block type."""
 
     def __init__(self, block_type: BlockType, lanes: int):
-        super().__init__(block_type.kernel, (), False, lanes, frozenset({"p", "pc", "ps"}), frozenset())
+        super().__init__(block_type.kernel, (), False, lanes, frozenset({"p", "pc", "ps"}))
         self.block_type, self.text = block_type, BlockText(self.ir)
         first = block_type.slot_count - len(block_type.inner_links)
         self.inner_slots = range(first, block_type.slot_count)
@@ -231,17 +232,11 @@ class _BlockTypeWriter(KernelWriter):
         text.begin_steps(len(self.inner_slots))
         names = self._load_operands(rates)
         row = t.double_pointer(text.slot(self.block_type.slot_count), t.add_instruction(f"mul i64 %k, {TABLE_COLUMNS}"))
-        *weights, count, limit = (
-            t.add_instruction(f"load double, ptr {t.double_pointer(row, str(k))}") for k in range(TABLE_COLUMNS)
-        )
-        self.predictor_weights = [t.broadcast(weight) for weight in weights]
         t.store(t.constant(1.0), self.regularity_slot)
-        self.begin_newton_step()
-        self.write_prediction(part)
-        self.write_corrections(part, names, t.add_instruction(f"fptosi double {count} to i64"))
+        self.begin_newton_step(row)
+        self.write_newton_block(part, names)
         rows, residual = self._write_links(names, rates)
-        is_near = t.compare("ole", t.load(self.correction_slot), t.broadcast(limit))
-        is_good = t.and_flags(t.compare("ole", residual, text.tolerance), is_near)
+        is_good = t.and_flags(t.compare("ole", residual, text.tolerance), self.write_is_as_predicted())
         self._end_run(rows, is_good, t.load(self.regularity_slot))
         if self.linear_systems is not None:
             t.write_line(self.linear_systems.function_text)
@@ -306,7 +301,7 @@ class _BlockTypeWriter(KernelWriter):
 
     def _write_links(self, names: OperandNames, rates: bool = False) -> tuple[list[list[str]], str]:
         """The rows of the inner links: their poses, each followed by its rates if they are wanted: x', y', angle', then
-        the second ones; and the largest residual."""
+        the second ones; and the sum of the residuals."""
         t, e, s, links = self.ir, self.equations.equations, self.symbols, self.block_type.inner_links
         poses = ca.vertcat(*(ca.SX(part) for link in links for part in self.equations.frames[link][:POSE_ROWS]))
         outputs: list[ca.SX] = [self.equations.residuals(), poses]
@@ -319,68 +314,48 @@ class _BlockTypeWriter(KernelWriter):
             [value for k, order in enumerate(orders) for value in _part_of(order, link, 3 if k else POSE_ROWS)]
             for link in range(len(links))
         ]
-        largest = total = t.constant(0.0)
-        for residual in (*residuals, *self.write_circle_residuals(names)):
-            size = t.call_intrinsic("fabs", residual)
-            largest, total = t.call_intrinsic("maxnum", largest, size), t.binary("add", total, size)
-        # NaN stays in a sum, but not in the largest
-        return rows, t.binary("add", largest, t.binary("mul", t.constant(NAN_PROBE), total))
+        return rows, write_residual_sum(t, [*residuals, *self.write_circle_residuals(names)])
 
     def write_start(self) -> None:
         """The start: all assembly modes, and of them the nearest to the sketch."""
         t, text, kind = self.ir, self.text, self.block_type
         text.begin_steps()
         operands, count = self._load_operands(False), len(self.inner_slots)
-        sums = [
-            [text.number(kind.number_count + SKETCH_SUMS * k + i) for i in range(SKETCH_SUMS)] for k in range(count)
-        ]
-        far = t.constant(FAR_AWAY)
-        outputs, nearest, second, least_clear = list[str](), far, far, t.constant(inf)
+        sum_names = {("sum", k): text.number(kind.number_count + k) for k in range(SKETCH_SUMS * count)}
+        poses, sums = (ca.SX.sym(name, size * count) for name, size in (("pose", POSE_ROWS), ("sum", SKETCH_SUMS)))
+        self.symbols |= {"pose": poses, "sum": sums}
+        links = zip(ca.vertsplit(poses, POSE_ROWS), ca.vertsplit(sums, SKETCH_SUMS), strict=True)
+        squared_distance = sum(squared_sketch_distance(*map(ca.vertsplit, link)) for link in links)
+        far, least_clear = t.constant(FAR_AWAY), t.constant(inf)
+        options = []
         for signs in product((1.0, -1.0), repeat=kind.sign_count):
             sign_names = {("sign", k): t.constant(sign) for k, sign in enumerate(signs)}
             names: OperandNames = operands | sign_names
             clear = self._write_closed_forms(names)
             rows, residual = self._write_links(names)
-            mode = [*(value for row in rows for value in row), *sign_names.values(), residual]
+            values = [value for row in rows for value in row]
+            pose_names = {("pose", k): value for k, value in enumerate(values)}
+            (distance,) = self.write_values([squared_distance], pose_names | sum_names)
             # a mode that cannot be assembled is far away
-            distance = t.select(t.compare("olt", residual, far), self._write_sketch_distance(rows, sums), far)
-            is_nearer = t.compare("olt", distance, nearest)
-            outputs = [t.select(is_nearer, *both) for both in zip(mode, outputs, strict=True)] if outputs else mode
-            second = t.call_intrinsic("minnum", second, t.call_intrinsic("maxnum", nearest, distance))
-            nearest = t.call_intrinsic("minnum", nearest, distance)
+            distance = t.select(t.compare("olt", residual, far), distance, far)
+            options.append(([*values, *sign_names.values(), residual], distance))
             least_clear = t.call_intrinsic("minnum", least_clear, t.call_intrinsic("fabs", clear))
         places = [(slot, row) for slot in self.inner_slots for row in range(POSE_ROWS)]
         places += [(kind.slot_count, k) for k in range(kind.sign_count + JUDGED_ROWS)]
-        *outputs, residual = outputs
+        (*outputs, residual), nearest, second = write_nearest(t, options)
         text.store_rows([*outputs, nearest, second, residual, least_clear], places)
         text.end_steps()
 
-    def _write_sketch_distance(self, rows: list[list[str]], sums: list[list[str]]) -> str:
-        """The squared distance of the links' points to the sketch, from the sums of its points."""
-        t = self.ir
-        add, sub, mul = (partial(t.binary, what) for what in ("add", "sub", "mul"))
-        total = t.constant(0.0)
-        for (x, y, c, s), (count, px, py, tx, ty, along, across, squares) in zip(rows, sums, strict=True):
-            rotated = sub(mul(c, px), mul(s, py)), add(mul(s, px), mul(c, py))
-            mixed = add(mul(x, sub(rotated[0], tx)), mul(y, sub(rotated[1], ty)))
-            mixed = sub(mixed, add(mul(c, along), mul(s, across)))
-            square = mul(count, add(mul(x, x), mul(y, y)))
-            total = add(total, add(add(square, add(mixed, mixed)), squares))
-        return total
+
+def squared_sketch_distance(pose: Iterable[Any], sums: Iterable[Any]) -> Any:
+    """The squared distance of the points of a link to the sketch, by x, y, cos and sin, from the sums of its points."""
+    (x, y, c, s), (count, px, py, tx, ty, along, across, squares) = pose, sums
+    mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
+    return count * (x * x + y * y) + 2.0 * mixed + squares
 
 
 def _part_of(values: Sequence[str], index: int, size: int) -> Sequence[str]:
     return values[size * index : size * (index + 1)]
-
-
-def step_table(steps: int, step: float) -> Array:
-    """Of every step of such a length the weights of the steps before, how often it is corrected, and by how much at
-    most (steps, TABLE_COLUMNS): what is not where it was predicted may be elsewhere."""
-    table = np.empty((steps, TABLE_COLUMNS))
-    table[:, :PREDICTOR_ORDER] = prediction_weights(steps)
-    table[:, -2:] = CORRECTIONS, correction_limit(step)
-    table[: PREDICTOR_ORDER + 1, -2], table[:PREDICTOR_ORDER, -1] = FIRST_CORRECTIONS, inf
-    return table
 
 
 def newton_numbers(block_type: BlockType, p: Array, start: Array) -> Array:

@@ -17,6 +17,7 @@ from planar.batch.mechanisms.block_type import (
     SKETCH_SUMS,
     BlockType,
     newton_numbers,
+    squared_sketch_distance,
 )
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
 from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, rotations, run_steps
@@ -77,10 +78,10 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
             distance = np.where(is_good, np.maximum(nearest, 0.0), 0.0)
             margins.append((owner, second - nearest))
         else:
-            shown = starts.shown[kind]
-            block_numbers.append(newton_numbers(kind, batch.p, shown.unknowns))
+            unknowns, is_shown = starts.shown[kind]
+            block_numbers.append(newton_numbers(kind, batch.p, unknowns))
             distance, points = starts.distance_to_sketch(batch)
-            is_good = shown.is_shown & (points > 0.0) & is_at_sketch(distance, points)
+            is_good = is_shown & (points > 0.0) & is_at_sketch(distance, points)
             needed = distance / np.maximum(points, 1.0) / SKETCH_DISTANCE_RATIO**2
             np.maximum.at(clearance, owner[is_good], np.minimum(needed, CLEAR_REGULARITY**2)[is_good])
         is_sure[owner[~is_good]] = False
@@ -91,13 +92,6 @@ def find_linkage_assemblies(linkages: LinkageArrays) -> LinkageAssemblies:
         is_sure &= starts.run(clearance)
     is_sure &= ~linkages.has_short_arm
     return LinkageAssemblies(is_sure, block_numbers)
-
-
-class _ShownBlocks(NamedTuple):
-    """Unknowns of blocks where they are shown (blocks, unknowns), and which of them are (blocks,)."""
-
-    unknowns: Array
-    is_shown: BoolArray
 
 
 class _Starts:
@@ -113,7 +107,8 @@ class _Starts:
         self.kinds = make_block_kinds(types, False, is_start=True)
         self.places = {batch.block_type: self._link_places(batch.owner[:, None], batch.link_indices)
                        for batch in linkages.batches}  # fmt: skip
-        self.shown: dict[BlockType, _ShownBlocks] = {}
+        self.shown: dict[BlockType, tuple[Array, BoolArray]] = {}
+        "unknowns of blocks without closed form where they are shown (blocks, unknowns), and which are (blocks,)"
         has_closed_form = all(kind.has_closed_form for kind in types)
         self.frames = None if has_closed_form else _shown_frames(linkages, self.first)
         self.tape = self._make_tape()
@@ -137,7 +132,7 @@ class _Starts:
         if self.frames is None or kind.has_closed_form:
             return np.hstack([batch.p, self.sums[places[:, batch.inner_slots]].reshape(len(places), -1)])
         self.shown[kind] = _unknowns_from_frames(kind, self.frames, places, batch.p)
-        return newton_numbers(kind, batch.p, self.shown[kind].unknowns)
+        return newton_numbers(kind, batch.p, self.shown[kind][0])
 
     def run(self, clearance: Array) -> BoolArray:
         """Fill the state, linkage after linkage: which of them (linkages,) are closed and so regular."""
@@ -150,7 +145,7 @@ class _Starts:
 
     def take_solved_frames(self) -> bool:
         """Begin again where links are not shown, but where what was solved before has them; whether there are any."""
-        if self.frames is None or all(blocks.is_shown.all() for blocks in self.shown.values()):
+        if self.frames is None or all(is_shown.all() for _, is_shown in self.shown.values()):
             return False
         x, y, c, s = self.state[: self.place_count, :POSE_ROWS, 0].T
         with np.errstate(invalid="ignore"):
@@ -164,12 +159,10 @@ class _Starts:
     def distance_to_sketch(self, batch: BlockBatch) -> tuple[Array, Array]:
         """Squared distances of the points of blocks to the sketch (blocks,), and how many points these are."""
         inner = self.places[batch.block_type][:, batch.inner_slots]
-        x, y, c, s = np.moveaxis(self.state[inner, :POSE_ROWS, 0], 2, 0)
-        counts, px, py, tx, ty, along, across, squares = np.moveaxis(self.sums[inner], 2, 0)
+        poses, sums = (np.moveaxis(rows, 2, 0) for rows in (self.state[inner, :POSE_ROWS, 0], self.sums[inner]))
         with np.errstate(invalid="ignore", over="ignore"):
-            mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
-            squared_distance = np.maximum(np.sum(counts * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
-        return squared_distance, counts.sum(axis=1)
+            squared_distance = np.maximum(np.sum(squared_sketch_distance(poses, sums), axis=1), 0.0)
+        return squared_distance, sums[0].sum(axis=1)
 
 
 class _ShownFrames(NamedTuple):
@@ -220,9 +213,9 @@ class _Slide(NamedTuple):
         return list(self.pair.residual([frames[link] for link in self.pair.bodies], self.numbers, coordinates))
 
 
-def _unknowns_from_frames(kind: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> _ShownBlocks:
-    """The unknowns of blocks whose links are shown so; p (blocks, numbers). Lengths of slides are read off the frames,
-    in which they are linear."""
+def _unknowns_from_frames(kind: BlockType, shown: _ShownFrames, index: IntArray, p: Array) -> tuple[Array, BoolArray]:
+    """The unknowns of blocks whose links are shown (blocks, unknowns), and whether those of a block are (blocks,), by
+    p (blocks, numbers). Lengths of slides are read off the frames, in which they are linear."""
     slides, first = list[_Slide](), 0
     for pair in kind.mechanism.pairs:
         if pair.coordinate_kinds:
@@ -249,7 +242,7 @@ def _unknowns_from_frames(kind: BlockType, shown: _ShownFrames, index: IntArray,
     unknowns |= {(name, "angle"): frames[name].angle for name in kind.inner_links}
     e = kind.equations
     names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
-    return _ShownBlocks(np.stack([unknowns[name] for name in names], axis=1), is_shown)
+    return np.stack([unknowns[name] for name in names], axis=1), is_shown
 
 
 def _align_slider(

@@ -19,7 +19,8 @@ import numpy as np
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.design_batch import DesignBatch
-from planar.batch.march.kernel import KernelInstructions, Operand
+from planar.batch.march.kernel import Operand
+from planar.batch.march.kernel_writer import KernelWriter
 from planar.batch.march.runs import run_designs
 from planar.batch.named_results.design_forces import position_chunks
 from planar.batch.named_results.design_frames import DesignFrames
@@ -39,8 +40,6 @@ from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.elimination import stack_expressions
-from planar.equations.linear import solve_by_determinants
-from planar.equations.rates import block_jacobian
 from planar.equations.residuals import input_positions, split_pair_numbers
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, suggest_name
@@ -224,9 +223,8 @@ class SlopeRows:
 class _SlopeWriter:
     """Writes the rows into one march."""
 
-    def __init__(self, rows: SlopeRows, writer: Any):
-        self.rows, self.writer, self.changes = rows, writer, rows.changes
-        kernel: KernelInstructions = writer
+    def __init__(self, rows: SlopeRows, kernel: KernelWriter):
+        self.rows, self.changes = rows, rows.changes
         e, s = kernel.equations.equations, kernel.symbols
         self.kernel, self.count = kernel, e.z.numel()
         self.unknowns = [e.z, s["z1"], s["z2"]][: rows.orders]
@@ -240,27 +238,17 @@ class _SlopeWriter:
 
     def write(self, have: dict[Operand, str]) -> list[str]:
         """The rows, after the unknowns' slopes have been put into `have`."""
-        e, t = self.kernel.equations.equations, self.writer.ir
-        levels = with_rates(e.F, self.y)
+        levels = with_rates(self.kernel.equations.equations.F, self.y)
         number_count = self.changes.shape[1]
         for part in self.kernel.equations.blocks:
-            jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-            if part.is_large:
-                columns = self.writer.write_values([ca.vec(jacobian)], have)
-                self.writer.linear_systems.factorise(columns, len(part.unknowns))
+            self.kernel.factorise_block(part, have)
             for order, level in enumerate(levels):
                 openings = ca.horzsplit(self._slopes_of(level[part.block.rows], order, part.unknowns.start))
-                if part.is_large:
-                    known = self.writer.write_separately(openings, have)
-                    solutions = [self.writer.linear_systems.solve(column) for column in known]
-                else:
-                    solved = [solve_by_determinants(jacobian, opening) for opening in openings]
-                    solutions = self.writer.write_separately(solved, have)
-                for number, values in enumerate(solutions):
+                for number, values in enumerate(self.kernel.solve_block(part, openings, have)):
                     first = (order * number_count + number) * self.count
                     for k, value in zip(part.unknowns, values, strict=True):
-                        have["slope", first + k] = t.add_instruction(f"fneg {t.vector} {value}")
-        return self.writer.write_values(self._result_slopes(), have)
+                        have["slope", first + k] = value
+        return self.kernel.write_values(self._result_slopes(), have)
 
     def _slopes_of(self, value: ca.SX, order: int, known: int) -> ca.SX:
         """The slopes (rows, numbers) of an expression of an order, where the slopes of the first `known` unknowns of

@@ -28,9 +28,16 @@ from planar.batch.march.designs_writer import (
     write_designs_kernel,
 )
 from planar.batch.march.kernel import KernelBlock, KernelEquations, Operand, operand_rows
-from planar.batch.march.kernel_writer import KernelWriter, OperandNames, write_keeps_apart
+from planar.batch.march.kernel_writer import (
+    KernelWriter,
+    OperandNames,
+    write_keeps_apart,
+    write_residual_sum,
+    write_squared_distance,
+)
 from planar.batch.march.prediction import (
     CLEAR_REGULARITY,
+    CORRECTIONS_COLUMN,
     LEAST_COSINE,
     LEAST_KERNEL_REGULARITY,
     MAX_TURN_PER_STEP,
@@ -39,7 +46,7 @@ from planar.batch.march.prediction import (
     least_regularity,
     longest_step,
 )
-from planar.batch.march.runs import run_designs, step_table, unknowns_at_steps
+from planar.batch.march.runs import run_designs, run_table, unknowns_at_steps
 from planar.batch.prepare.compiled_runs import (
     ALL_SOLVED,
     CANNOT_BE_ASSEMBLED,
@@ -168,23 +175,17 @@ class _StartWriter(BlockJoinWriter):
         for k, part in enumerate(self.equations.blocks):
             if k < self.enumerated:
                 have["sign", k] = t.constants([1.0 if lane >> k & 1 else -1.0 for lane in range(t.lanes)])
-                coalescence = self.write_closed_form(part, have)
-                self._add_block(k, coalescence, self._write_distance(part, have))
+                coalescence, distance = self.write_closed_form(part, have), self.write_distance(part, have)
             else:
-                self._write_nearer(part, k, have)
+                _, distance, other_distance, coalescence = self.write_block(part, have)
+                farther = t.binary("add", self.total, other_distance)
+                is_joined = t.compare("olt", coalescence, t.constant(MEETING_COSINE_SQUARED))
+                farther = t.select(is_joined, farther, t.constant(inf))
+                self.otherwise = t.call_intrinsic("minnum", self.otherwise, farther)
+            self._add_block(k, coalescence, distance)
         self._write_choice(have)
         t.end_function()
         return t
-
-    def _write_nearer(self, part: KernelBlock, k: int, have: OperandNames) -> None:
-        """A block in the nearer of its assemblies."""
-        t = self.ir
-        block = self.write_block(part, have, "zeroinitializer")
-        have["sign", k] = block.sign
-        farther = t.binary("add", self.total, block.other_distance)
-        is_joined = t.compare("olt", block.coalescence, t.constant(MEETING_COSINE_SQUARED))
-        self.otherwise = t.call_intrinsic("minnum", self.otherwise, t.select(is_joined, farther, t.constant(inf)))
-        self._add_block(k, block.coalescence, block.distance)
 
     def _add_block(self, k: int, coalescence: str, distance: str) -> None:
         """Add a block: to lanes in which it is joined, in which it may be, and in which it cannot be."""
@@ -231,7 +232,7 @@ class _PositionsWriter(KernelWriter):
     def __init__(self, design: DesignNumbers, links: tuple[str, ...] | None, rates: bool, order: tuple[Operand, ...]):
         invariant = frozenset({"p", "q", "u1", "u2", "sign", "stop"})
         rates = rates and links is not None
-        super().__init__(design.equations("q"), links or (), rates, LANES, invariant, frozenset())
+        super().__init__(design.equations("q"), links or (), rates, LANES, invariant)
         self.order, self.tells_states = order, links is None
 
     def write_stage(self, constants: Mapping[str, Any]) -> tuple[int, int]:
@@ -263,8 +264,7 @@ class _PositionsWriter(KernelWriter):
         residuals, angles, *orders = self.write_separately(
             [equations.residuals(), self.counted_angles(), *self.output_expressions()], have
         )
-        magnitudes = [t.call_intrinsic("fabs", each) for each in (*residuals, *self.write_circle_residuals(have))]
-        residual = t.add_all([t.constant(0.0), *magnitudes])
+        residual = write_residual_sum(t, [*residuals, *self.write_circle_residuals(have)])
         results = [t.binary("mul", have["unit", 0], value) for order in orders for value in order]
         if self.tells_states:
             results = [have[operand] for operand in self.state_operands()]
@@ -389,9 +389,8 @@ def newton_stages(
     march = write_designs_kernel(KernelRequest(equations, links, rates, LANES, (-1,) * len(links), streams=False))
     starts, assembly_counts, lanes = _assembly_lanes(reference, equations)
     kernels = [compile_function(kernel.ir, MARCH_FUNCTION, *MARCH_ARGUMENTS) for kernel in (corrector, march)]
-    table, counts = _step_table(u, steps)
-    start_table, start_counts = step_table(np.zeros((1, u.shape[1])))
-    start_counts[:] = CORRECTIONS
+    start_table = run_table(np.zeros((1, u.shape[1])))
+    start_table[:, CORRECTIONS_COLUMN] = CORRECTIONS
     # the place of each position in the rows of the march; the last one is repeated
     position = np.minimum(np.arange(padded_width(len(u))), len(u) - 1)
     lane = np.searchsorted(firsts, position, side="right") - 1
@@ -403,12 +402,10 @@ def newton_stages(
         "starts": operand_rows(corrector.state, starts),
         "start inputs": operand_rows(corrector.inputs, np.repeat(u[:1].T, LANES, axis=1)),
         "start table": start_table,
-        "start counts": start_counts,
         "march": kernels[1],
         "states": operand_rows(march.state, _own_unknowns(reference, u, members, firsts)),
         "inputs": operand_rows(march.inputs, u[firsts].T),
-        "table": table,
-        "counts": counts,
+        "table": _piece_table(u, steps),
         "steps": steps + 1,
         "places": (position - firsts[lane]) * march.output_row_count * LANES + lane,
         "correction limit": correction_limit(longest_step(u)),
@@ -515,12 +512,12 @@ class _NewtonWriter:
         return base
 
     def _write_kernel_call(
-        self, function: str, arrays: Sequence[str], steps: str, row_count: int, limits: Sequence[str], out: str
+        self, function: str, arrays: Sequence[str], steps: str, row_count: int, scale: str, out: str
     ) -> str:
         """Call a kernel; the pointer to how many steps of each lane are good."""
         good = self._take_scratch(1)
         pointers = ", ".join(f"ptr {array}" for array in arrays)
-        numbers = ", ".join(f"double {limit}" for limit in limits)
+        numbers = f"double {self._number('tolerance')}, double {scale}"
         self.ir.write_line(
             f"call void {self._constant(function)}(i64 1, i64 {steps}, i64 {LANES}, i64 {LANES}, "
             f"i64 {row_count * LANES}, {pointers}, {numbers}, ptr {out}, ptr {good}, ptr null)"
@@ -532,9 +529,8 @@ class _NewtonWriter:
         count = self.corrector.output_row_count
         out = self._take_scratch(count)
         arrays = [rows["p"], rows["at"], self._constant("starts"), self._write_inputs("start inputs"), rows["u1"]]
-        arrays += [self._constant("start table"), self._constant("start counts")]
-        limits = (self._number("tolerance"), "0x7FF0000000000000", "1.0")
-        return self._write_kernel_call("corrector", arrays, "1", count, limits, out), out
+        arrays.append(self._constant("start table"))
+        return self._write_kernel_call("corrector", arrays, "1", count, "1.0", out), out
 
     def _lane(self, value: str, lane: int = 0) -> str:
         """The number of one lane in every lane."""
@@ -546,8 +542,11 @@ class _NewtonWriter:
         t, blocks = self.ir, self.design.sketched_blocks
         sketch = [*load_numbers(t, self.order, "sketch").values()]
         costs, other_costs = (
-            [self._write_squared_distance(out, first + 2 * k, sketch[2 * k : 2 * k + 2]) for k in range(len(blocks))]
-            for first in (0, 2 * len(blocks))
+            [
+                write_squared_distance(t, [self._row(out, first + k + axis) for axis in range(2)], sketch[k : k + 2])
+                for k in range(0, len(sketch), 2)
+            ]
+            for first in (0, len(sketch))
         )
         converged = t.compare("ogt", t.load(good), t.constant(0.0))
         regularity = self._row(out, self.first_state + len(self.corrector.state))
@@ -580,11 +579,6 @@ class _NewtonWriter:
             earlier_cost = t.add_instruction(f"fadd {t.vector} {earlier_cost}, {first_cost}")
         return t.add_instruction(f"extractelement <{LANES} x i1> {is_nearest}, i64 0")
 
-    def _write_squared_distance(self, out: str, row: int, target: Sequence[str]) -> str:
-        t = self.ir
-        gaps = [t.binary("sub", self._row(out, row + axis), target[axis]) for axis in range(2)]
-        return t.add_all([t.binary("mul", gap, gap) for gap in gaps])
-
     def _write_least_other(
         self, part: KernelBlock, out: str, converged: str, assemblies: tuple[int, range], cost: str
     ) -> str:
@@ -614,11 +608,11 @@ class _NewtonWriter:
     def _write_march(self, rows: dict[str, str]) -> tuple[str, str]:
         """The run, a piece in each lane: how many steps went well, and the rows of the kernel at all steps."""
         arrays = [rows["p"], rows["q"], self._constant("states"), self._write_inputs("inputs"), rows["u1"]]
-        arrays += [self._constant("table"), self._constant("counts")]
-        limits = (self._number("tolerance"), self.limit, self._number("unit"))
+        arrays.append(self._constant("table"))
         # the rows stand at the end of the memory, where there is room for as many steps as there are
         out, count = self.ir.double_pointer("%scratch", str(self.scratch_size + LANES)), self.march.output_row_count
-        return self._write_kernel_call("march", arrays, self._constant("steps"), count, limits, out), out
+        scale = self._number("unit")
+        return self._write_kernel_call("march", arrays, self._constant("steps"), count, scale, out), out
 
     def _write_gather(self, good: str, out: str) -> None:
         """Write the results and the states of all positions in their order, if all of them are solved and regular."""
@@ -723,12 +717,13 @@ def _assembly_lanes(reference: ReferenceDesign, equations: KernelEquations) -> t
     return np.array(starts).T, [lists[part.block.block_index][1] for part in equations.blocks], lanes
 
 
-def _step_table(u: Array, steps: int) -> tuple[Array, Array]:
-    """The table of a piece of `steps` steps, and the corrections of each."""
-    table, counts = step_table(u[: steps + 1] - u[0])
-    # what is predicted from so few steps is off by as many powers of a step; each correction doubles the digits
+def _piece_table(u: Array, steps: int) -> Array:
+    """The `run_table` of a piece of `steps` steps."""
+    table = run_table(u[: steps + 1] - u[0])
+    counts = table[:, CORRECTIONS_COLUMN]
+    # a prediction by k positions has an error of order k in the step; a correction doubles the digits
     digits = max(-log10(longest_step(u)), 0.3)
     for step in range(1, PREDICTOR_ORDER + 1):
         counts[step] = max(counts[-1], ceil(log2(max(DIGITS / (step * digits), 1.0))) + 1)
     counts[0] = START_CORRECTIONS
-    return table, counts
+    return table
