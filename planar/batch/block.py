@@ -7,10 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
-from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.design_stops import STEPS_BEYOND_STOP, find_input_stops, watch_stops
+from planar.batch.design_ends import (
+    DEAD_POINT_MARGIN,
+    STEPS_BEYOND_STOP,
+    FollowedDesigns,
+    closed_form_designs,
+    find_input_stops,
+    follow_to_dead_points,
+    watch_stops,
+)
 from planar.batch.general_path import OUTCOMES, DesignQuestion
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
@@ -334,13 +340,13 @@ class DesignBlockSolver:
         out = self._own_output(march)
         out[:] = np.nan
         if self.has_own_range:
-            self.limits[:, chosen], rows = run_between_limits(designs, self.block.steps)
+            self.limits[:, chosen], rows = designs.run_between_limits(self.block.steps)
             settled = np.isfinite(self.limits[0, chosen])
             out[:, :, chosen[settled]] = rows[:, :, settled]
             self.solved_steps[chosen[settled]] = len(out)
         else:
             lengths, none = self.range_length[chosen] / self.scale, np.zeros(chosen.size, dtype=int)
-            self._settle(chosen, find_ends(designs, lengths, none, none, self.block.steps), out)
+            self._settle(chosen, designs.follow_to_ends(lengths, none, none, self.block.steps), out)
         return out
 
     def _own_output(self, march: DesignBatch) -> Array:
@@ -394,7 +400,7 @@ class DesignBlockSolver:
         designs = closed_form_designs(march.select(remaining), index)
         if designs is not None:
             lengths, first = self.range_length[remaining] / self.scale, np.maximum(good, candidates)[remaining]
-            ends = find_ends(designs, lengths, good[remaining], first, self.block.steps)
+            ends = designs.follow_to_ends(lengths, good[remaining], first, self.block.steps)
             self._settle(remaining, ends, out)
             remaining = remaining[~ends.is_settled]
         if remaining.size:
@@ -435,7 +441,7 @@ class DesignBlockSolver:
             z, ends = designs.lead(span, LEAD_IN_STEP)
             room = ends.distance - np.abs(span)
             dead = np.isfinite(ends.distance) & (-room > DEAD_POINT_MARGIN * np.abs(span))
-            self.solved_steps[chosen[dead]], self.is_stopped[chosen[dead]] = 0, designs.is_stop(ends)[dead]
+            self.solved_steps[chosen[dead]], self.is_stopped[chosen[dead]] = 0, ends.is_stopped[dead]
             arrived[chosen] = room > DEAD_POINT_MARGIN * np.abs(span)
         else:
             z, arrived[chosen] = lead_designs(origin, index, span, LEAD_IN_STEP)
