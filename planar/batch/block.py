@@ -179,19 +179,19 @@ class DesignBlockSolver:
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
         rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
+        shape, early = (self.design_count, block.steps + 1), np.flatnonzero(code)
         # one number for all where there is no other, which takes no room
-        status: Array = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
-        early = np.flatnonzero(code)
-        if rest or early.size:
-            status = status.copy()
+        status: Array = np.zeros(shape, np.int8) if rest or early.size else np.broadcast_to(np.int8(0), shape)
+        if early.size:
             # no wider than steps are counted: of all positions
             counter = np.min_scalar_type(-block.steps - 2)
             is_beyond = np.arange(block.steps + 1).astype(counter) >= solved[early].astype(counter)[:, None]
             status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
-            int(number): (int(count), self._question(int(early[first]), inputs))
-            for number, first, count in zip(*np.unique(code[early], return_index=True, return_counts=True), strict=True)
+            number: (count, self._question(int(np.argmax(code == number)), inputs))
+            for number, count in enumerate(np.bincount(code).tolist())
+            if number and count
         }
         for index in rest:
             self._solve_alone(index, out, status, inputs)
