@@ -17,7 +17,7 @@ from planar.batch.design_ends import (
     follow_to_dead_points,
     watch_stops,
 )
-from planar.batch.general_path import OUTCOMES, DesignQuestion
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
 from planar.batch.march.runs import lead_designs, run_designs
@@ -89,6 +89,20 @@ class DesignBlock(NamedTuple):
         u = reference.design_rows(self.designs, self.design_count).u[:, index]
         return reference.with_sketch_of(design, self.assemblies[:, index], u)
 
+    @property
+    def has_own_ranges(self) -> bool:
+        """Whether every design has a range of its own, from limit to limit."""
+        return self.reference().is_sliding and self.stop is None and self.duration is None
+
+    def design_run(self, index: int, inputs: Array) -> DesignRun:
+        """One design, and the range or the time that it is to run; `inputs` as of `SolvedDesigns`."""
+        reference = self.reference()
+        mechanism, values = reference.mechanism, values_of_design(self.designs, index)
+        if self.assemblies is not None:
+            mechanism, values = self.single_design(index), {}
+        grid = None if self.has_own_ranges else inputs if inputs.ndim == 1 else inputs[index]
+        return DesignRun(mechanism, reference.pair, grid, self.steps, values, self.start, self.duration)
+
 
 class SolvedDesigns(NamedTuple):
     """A solved block: out (steps + 1, rows, designs), x and y of every point, then first, then second rates (m, s);
@@ -105,7 +119,7 @@ class SolvedDesigns(NamedTuple):
     input: Array
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, str | DesignQuestion | NoAnswer], ...]
+    endings: tuple[tuple[int, int, str | DesignRun | NoAnswer], ...]
     dead_point: Array
     stop_position: Array
 
@@ -144,8 +158,7 @@ class DesignBlockSolver:
         self.start: Array = self.rows.u[self.reference.running_index] * self.scale
         if block.start is not None:
             self.start = np.full(self.design_count, float(block.start))
-        self.has_own_range = self.reference.is_sliding and block.stop is None and block.duration is None
-        "whether every design has a range of its own, from limit to limit"
+        self.has_own_range = block.has_own_ranges
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design whose end is known"
         self.ends = np.full((2, self.design_count), np.nan)
@@ -153,7 +166,7 @@ class DesignBlockSolver:
         self.is_stopped = np.zeros(self.design_count, dtype=bool)
         "which designs are ended by a stop, of those whose end is known"
         self.general_positions, self.followed_designs = 0, 0
-        self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
+        self.endings: dict[int, tuple[int, str | DesignRun | NoAnswer]] = {}
         self.limits = np.full((2, self.design_count), np.nan)
         "between which inputs run that have a range of their own, rad or sizes"
         self.failed_block = np.full(self.design_count, -1)
@@ -189,7 +202,7 @@ class DesignBlockSolver:
             status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
-            number: (count, self._question(int(np.argmax(code == number)), inputs))
+            number: (count, block.design_run(int(np.argmax(code == number)), inputs))
             for number, count in enumerate(np.bincount(code).tolist())
             if number and count
         }
@@ -224,18 +237,9 @@ class DesignBlockSolver:
             return np.asarray(self.start[0] + self.range_length[0] * grid)
         return np.asarray(self.start[:, None] + self.range_length[:, None] * grid)
 
-    def _question(self, index: int, inputs: Array) -> DesignQuestion:
-        """A design, and the range or the time that it is to run."""
-        block, mechanism, values = self.block, self.reference.mechanism, values_of_design(self.block.designs, index)
-        if block.assemblies is not None:
-            mechanism, values = block.single_design(index), {}
-        grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
-        ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
-        return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends, block.duration)
-
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""
-        solved = self._question(index, inputs).solve(self.block.points, self.block.rates)
+        solved = self.block.design_run(index, inputs).solve(self.block.points, self.block.rates)
         out[:, :, index], status[index] = solved.out, solved.status
         self.ends[:, index] = solved.dead_point, solved.stop_position
         if self.has_own_range:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.general_path import SolvedDesign, solve_design
+from planar.batch.general_path import DesignRun, SolvedDesign
 from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.initial_assembly import LinkageAssemblies, find_linkage_assemblies
 from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, SweepRequest, make_linkage_arrays, watched_links
@@ -298,5 +298,4 @@ def _solve_by_general_path(mechanism: Mechanism, names: Sequence[str], request: 
     pair, grid = inputs[running].pair, None
     if relative_motions(mechanism)[pair].input_kind is not MeasureKind.LENGTH:
         grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
-    ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
-    return solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)
+    return DesignRun(mechanism, pair, grid, request.steps).solve(tuple(names), request.rates)

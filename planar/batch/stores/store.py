@@ -47,7 +47,7 @@ class SweepPlan:
 
     all_designs: DesignBlock
     block_size: int
-    results: RequestedResults = RequestedResults()
+    results: RequestedResults
     assemblies: ListedAssemblies | None = None
 
     @property
