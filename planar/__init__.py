@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from planar.batch.gradients.run_gradients import RunGradient
     from planar.batch.mechanisms.results import Each, Swept
     from planar.batch.prepared import PreparedRun, PreparedSweep, prepared
-    from planar.batch.reductions.reduced_sweep import ReducedSweep
+    from planar.batch.reductions import ReducedSweep
     from planar.batch.results import Sweep
     from planar.batch.sweep import sweep
     from planar.batch.sweep_mechanisms import sweep_each

@@ -14,7 +14,7 @@ import numpy as np
 import planar
 from benchmarks.truth.random_cases import Case
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.general_path import OUTCOMES, solve_design
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.batch.reference_design import ReferenceDesign
 
 Array = np.ndarray
@@ -94,11 +94,10 @@ class Truth:
         case, reference = self.case, self.reference
         mechanism = with_design_values(reference.mechanism, values)
         start = float(mechanism.inputs[reference.running_index].position)
-        grid, ends = None, (None, None)
+        grid = None
         if not reference.is_sliding:
             grid = start + 2.0 * np.pi * np.linspace(0.0, 1.0, case.steps + 1)
-            ends = float(grid[0]), float(grid[-1])
-        found = solve_design(mechanism, reference.pair, grid, case.steps, ends, self.points, case.rates)
+        found = DesignRun(mechanism, reference.pair, grid, case.steps).solve(self.points, case.rates)
         return DesignResult(found.out, found.status)
 
     @cached_property

@@ -7,11 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.ends import closed_form_designs, find_ends, run_between_limits
-from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import design_variables, split_into_blocks, values_of_design, with_design_values
-from planar.batch.design_stops import STEPS_BEYOND_STOP, find_input_stops, watch_stops
-from planar.batch.general_path import OUTCOMES, DesignQuestion
+from planar.batch.design_ends import (
+    DEAD_POINT_MARGIN,
+    STEPS_BEYOND_STOP,
+    FollowedDesigns,
+    closed_form_designs,
+    find_input_stops,
+    follow_to_dead_points,
+    watch_stops,
+)
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
 from planar.batch.march.runs import lead_designs, run_designs
@@ -89,6 +95,20 @@ class DesignBlock(NamedTuple):
         u = reference.design_rows(self.designs, self.design_count).u[:, index]
         return reference.with_sketch_of(design, self.assemblies[:, index], u)
 
+    @property
+    def has_own_ranges(self) -> bool:
+        """Whether every design has a range of its own, from limit to limit."""
+        return self.reference().is_sliding and self.stop is None and self.duration is None
+
+    def design_run(self, index: int, inputs: Array) -> DesignRun:
+        """One design, and the range or the time that it is to run; `inputs` as of `SolvedDesigns`."""
+        reference = self.reference()
+        mechanism, values = reference.mechanism, values_of_design(self.designs, index)
+        if self.assemblies is not None:
+            mechanism, values = self.single_design(index), {}
+        grid = None if self.has_own_ranges else inputs if inputs.ndim == 1 else inputs[index]
+        return DesignRun(mechanism, reference.pair, grid, self.steps, values, self.start, self.duration)
+
 
 class SolvedDesigns(NamedTuple):
     """A solved block: out (steps + 1, rows, designs), x and y of every point, then first, then second rates (m, s);
@@ -105,7 +125,7 @@ class SolvedDesigns(NamedTuple):
     input: Array
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, str | DesignQuestion | NoAnswer], ...]
+    endings: tuple[tuple[int, int, str | DesignRun | NoAnswer], ...]
     dead_point: Array
     stop_position: Array
 
@@ -144,8 +164,7 @@ class DesignBlockSolver:
         self.start: Array = self.rows.u[self.reference.running_index] * self.scale
         if block.start is not None:
             self.start = np.full(self.design_count, float(block.start))
-        self.has_own_range = self.reference.is_sliding and block.stop is None and block.duration is None
-        "whether every design has a range of its own, from limit to limit"
+        self.has_own_range = block.has_own_ranges
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design whose end is known"
         self.ends = np.full((2, self.design_count), np.nan)
@@ -153,7 +172,7 @@ class DesignBlockSolver:
         self.is_stopped = np.zeros(self.design_count, dtype=bool)
         "which designs are ended by a stop, of those whose end is known"
         self.general_positions, self.followed_designs = 0, 0
-        self.endings: dict[int, tuple[int, str | DesignQuestion | NoAnswer]] = {}
+        self.endings: dict[int, tuple[int, str | DesignRun | NoAnswer]] = {}
         self.limits = np.full((2, self.design_count), np.nan)
         "between which inputs run that have a range of their own, rad or sizes"
         self.failed_block = np.full(self.design_count, -1)
@@ -179,19 +198,19 @@ class DesignBlockSolver:
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
         rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
+        shape, early = (self.design_count, block.steps + 1), np.flatnonzero(code)
         # one number for all where there is no other, which takes no room
-        status: Array = np.broadcast_to(np.int8(0), (self.design_count, block.steps + 1))
-        early = np.flatnonzero(code)
-        if rest or early.size:
-            status = status.copy()
+        status: Array = np.zeros(shape, np.int8) if rest or early.size else np.broadcast_to(np.int8(0), shape)
+        if early.size:
             # no wider than steps are counted: of all positions
             counter = np.min_scalar_type(-block.steps - 2)
             is_beyond = np.arange(block.steps + 1).astype(counter) >= solved[early].astype(counter)[:, None]
             status[early] = is_beyond.view(np.int8) * code[early, None]
         inputs = self._input_positions()
         self.endings = {
-            int(number): (int(count), self._question(int(early[first]), inputs))
-            for number, first, count in zip(*np.unique(code[early], return_index=True, return_counts=True), strict=True)
+            number: (count, block.design_run(int(np.argmax(code == number)), inputs))
+            for number, count in enumerate(np.bincount(code).tolist())
+            if number and count
         }
         left = self._solve_by_blocks(rest, out)
         for index in left:
@@ -225,15 +244,6 @@ class DesignBlockSolver:
             return np.asarray(self.start[0] + self.range_length[0] * grid)
         return np.asarray(self.start[:, None] + self.range_length[:, None] * grid)
 
-    def _question(self, index: int, inputs: Array) -> DesignQuestion:
-        """A design, and the range or the time that it is to run."""
-        block, mechanism, values = self.block, self.reference.mechanism, values_of_design(self.block.designs, index)
-        if block.assemblies is not None:
-            mechanism, values = block.single_design(index), {}
-        grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
-        ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
-        return DesignQuestion(mechanism, values, self.reference.pair, grid, block.steps, ends, block.duration)
-
     def _solve_by_blocks(self, designs: list[int], out: Array) -> list[int]:
         """Solve designs as `sweep_each` does, whose functions are compiled for types of blocks; the designs that are
         left: those that it does not decide, or that do not come to the end."""
@@ -254,7 +264,7 @@ class DesignBlockSolver:
 
     def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
         """Solve a design by the general path."""
-        solved = self._question(index, inputs).solve(self.block.points, self.block.rates)
+        solved = self.block.design_run(index, inputs).solve(self.block.points, self.block.rates)
         out[:, :, index], status[index] = solved.out, solved.status
         self.ends[:, index] = solved.dead_point, solved.stop_position
         if self.has_own_range:
@@ -359,13 +369,13 @@ class DesignBlockSolver:
         out = self._own_output(march)
         out[:] = np.nan
         if self.has_own_range:
-            self.limits[:, chosen], rows = run_between_limits(designs, self.block.steps)
+            self.limits[:, chosen], rows = designs.run_between_limits(self.block.steps)
             settled = np.isfinite(self.limits[0, chosen])
             out[:, :, chosen[settled]] = rows[:, :, settled]
             self.solved_steps[chosen[settled]] = len(out)
         else:
             lengths, none = self.range_length[chosen] / self.scale, np.zeros(chosen.size, dtype=int)
-            self._settle(chosen, find_ends(designs, lengths, none, none, self.block.steps), out)
+            self._settle(chosen, designs.follow_to_ends(lengths, none, none, self.block.steps), out)
         return out
 
     def _own_output(self, march: DesignBatch) -> Array:
@@ -419,7 +429,7 @@ class DesignBlockSolver:
         designs = closed_form_designs(march.select(remaining), index)
         if designs is not None:
             lengths, first = self.range_length[remaining] / self.scale, np.maximum(good, candidates)[remaining]
-            ends = find_ends(designs, lengths, good[remaining], first, self.block.steps)
+            ends = designs.follow_to_ends(lengths, good[remaining], first, self.block.steps)
             self._settle(remaining, ends, out)
             remaining = remaining[~ends.is_settled]
         if remaining.size:
@@ -460,7 +470,7 @@ class DesignBlockSolver:
             z, ends = designs.lead(span, LEAD_IN_STEP)
             room = ends.distance - np.abs(span)
             dead = np.isfinite(ends.distance) & (-room > DEAD_POINT_MARGIN * np.abs(span))
-            self.solved_steps[chosen[dead]], self.is_stopped[chosen[dead]] = 0, designs.is_stop(ends)[dead]
+            self.solved_steps[chosen[dead]], self.is_stopped[chosen[dead]] = 0, ends.is_stopped[dead]
             arrived[chosen] = room > DEAD_POINT_MARGIN * np.abs(span)
         else:
             z, arrived[chosen] = lead_designs(origin, index, span, LEAD_IN_STEP)

@@ -39,26 +39,6 @@ class SolvedDesign(NamedTuple):
     stop_position: float = np.nan
 
 
-class DesignQuestion(NamedTuple):
-    """A design by its numbers, and the arguments of `solve_design`; its text says why the design ends."""
-
-    mechanism: Mechanism
-    values: Mapping[str, float]
-    pair: str
-    grid: Array | None
-    steps: int
-    range: tuple[float | None, float | None]
-    duration: float | None = None
-
-    def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:
-        """See `solve_design`."""
-        design = with_design_values(self.mechanism, self.values)
-        return solve_design(design, self.pair, self.grid, self.steps, self.range, points, rates, self.duration)
-
-    def __str__(self) -> str:
-        return str(self.solve((), False).message)
-
-
 class GridMotion(NamedTuple):
     """The motion of one design (None where there is none), the positions of the running input in its rows, or their
     times (s), how many of the rows are on the grid, the status of every row, and the reason of its end."""
@@ -70,75 +50,78 @@ class GridMotion(NamedTuple):
     message: str | NoAnswer
 
 
-def run_design(
-    mechanism: Mechanism,
-    pair: str,
-    grid: Array | None,
-    steps: int,
-    range_: tuple[float | None, float | None],
-    duration: float | None = None,
-) -> GridMotion:
-    """Run a design over a grid of positions (rows,) of its running input, or, without one, over its own range.
+class DesignRun(NamedTuple):
+    """One design, a mechanism with `values` of some of its numbers, and its run; as text, why it ends.
 
-    `range_` is the start and the stop of the cycle. With a `duration` (s) all its inputs run by their laws or rates,
-    and the grid is the times. Does not raise NoAnswer: the status contains it.
+    Its input `pair` runs over a grid of positions (steps + 1,), or, without a grid, from `start` over its own range.
+    With a `duration` (s) all its inputs run by their laws or rates, and the grid is the times.
     """
-    status = np.zeros(steps + 1, dtype=np.int8)
 
-    def without_motion(outcome: Outcome, message: str | NoAnswer) -> GridMotion:
-        status[:] = OUTCOMES.index(outcome)
-        return GridMotion(None, np.zeros(0), 0, status, message)
+    mechanism: Mechanism
+    pair: str
+    grid: Array | None
+    steps: int
+    values: Mapping[str, float] = {}
+    start: float | None = None
+    duration: float | None = None
 
-    reason = time_is_over()
-    if reason:
-        return without_motion(Outcome.INTERRUPTED, reason)
-    try:
-        run = (*range_, pair) if duration is None else ()
-        motion = cycle(mechanism, steps, *run, duration=duration)
-    except NoAnswer as problem:
-        return without_motion(problem.outcome, problem.with_traceback(None))  # its sentence takes long to make
-    except (BadInput, PointPlacementError) as problem:
-        return without_motion(Outcome.CANNOT_BE_ASSEMBLED, str(problem))
-    position = motion.time if duration is not None else None
-    if position is None:
-        position = motion.inputs[pair].position
-    row_count = min(len(position), steps + 1)
-    if grid is not None:
-        distance = np.abs(position[:row_count] - grid[:row_count])
-        is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
-        row_count = int(np.argmax(is_off)) if is_off.any() else row_count
-    status[row_count:] = OUTCOMES.index(motion.outcome)
-    return GridMotion(motion, position, row_count, status, motion.reason if row_count <= steps else "")
+    def motion(self) -> Motion:
+        """The motion of the design. Raises NoAnswer, BadInput and PointPlacementError."""
+        mechanism = with_design_values(self.mechanism, self.values)
+        if self.duration is not None:
+            return cycle(mechanism, self.steps, duration=self.duration)
+        start, stop = (self.start, None) if self.grid is None else (float(self.grid[0]), float(self.grid[-1]))
+        return cycle(mechanism, self.steps, start, stop, self.pair)
 
+    def run(self) -> GridMotion:
+        """The motion on the grid; instead of raising NoAnswer the status contains it."""
+        status, grid = np.zeros(self.steps + 1, dtype=np.int8), self.grid
 
-def solve_design(
-    mechanism: Mechanism,
-    pair: str,
-    grid: Array | None,
-    steps: int,
-    range_: tuple[float | None, float | None],
-    points: tuple[PointName, ...],
-    rates: bool,
-    duration: float | None = None,
-) -> SolvedDesign:
-    """Solve a design, see `run_design`; without a grid `input` is where its own range has the running input."""
-    if duration is not None:
-        grid = np.linspace(0.0, duration, steps + 1)
-    motion, position, row_count, status, message = run_design(mechanism, pair, grid, steps, range_, duration)
-    out = np.full((steps + 1, 2 * len(points) * (3 if rates else 1)), np.nan)
-    if grid is None:
-        grid = np.full(steps + 1, np.nan)
-        grid[: len(position)] = position[: steps + 1]
-    if motion is None:
-        return SolvedDesign(grid, out, status, message)
-    out[:row_count] = point_rows(motion, points, rates)[:row_count]
-    solved = SolvedDesign(grid, out, status, message, "; ".join(motion.rate_remarks) if rates else "")
-    if duration is not None or row_count > steps:
-        return solved
-    last = float(position[-1])
-    if motion.outcome is Outcome.DEAD_POINT:
-        return solved._replace(dead_point=last)
-    return solved._replace(stop_position=last) if motion.outcome is Outcome.STOP else solved
+        def without_motion(outcome: Outcome, message: str | NoAnswer) -> GridMotion:
+            status[:] = OUTCOMES.index(outcome)
+            return GridMotion(None, np.zeros(0), 0, status, message)
+
+        reason = time_is_over()
+        if reason:
+            return without_motion(Outcome.INTERRUPTED, reason)
+        try:
+            motion = self.motion()
+        except NoAnswer as problem:
+            return without_motion(problem.outcome, problem.with_traceback(None))  # its sentence takes long to make
+        except (BadInput, PointPlacementError) as problem:
+            return without_motion(Outcome.CANNOT_BE_ASSEMBLED, str(problem))
+        position = motion.time if self.duration is not None else None
+        if position is None:
+            position = motion.inputs[self.pair].position
+        row_count = min(len(position), self.steps + 1)
+        if grid is not None:
+            distance = np.abs(position[:row_count] - grid[:row_count])
+            is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
+            row_count = int(np.argmax(is_off)) if is_off.any() else row_count
+        status[row_count:] = OUTCOMES.index(motion.outcome)
+        return GridMotion(motion, position, row_count, status, motion.reason if row_count <= self.steps else "")
+
+    def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:
+        """The design with its points; without a grid `input` is where its own range has the running input."""
+        motion, position, row_count, status, message = self.run()
+        out = np.full((self.steps + 1, 2 * len(points) * (3 if rates else 1)), np.nan)
+        grid = self.grid
+        if grid is None:
+            grid = np.full(self.steps + 1, np.nan)
+            grid[: len(position)] = position[: self.steps + 1]
+        if motion is None:
+            return SolvedDesign(grid, out, status, message)
+        out[:row_count] = point_rows(motion, points, rates)[:row_count]
+        solved = SolvedDesign(grid, out, status, message, "; ".join(motion.rate_remarks) if rates else "")
+        if self.duration is not None or row_count > self.steps:
+            return solved
+        last = float(position[-1])
+        if motion.outcome is Outcome.DEAD_POINT:
+            return solved._replace(dead_point=last)
+        return solved._replace(stop_position=last) if motion.outcome is Outcome.STOP else solved
+
+    def __str__(self) -> str:
+        return str(self.solve((), False).message)
 
 
 def link_angles(motion: Motion, links: tuple[str, ...]) -> Array:

@@ -23,7 +23,7 @@ from planar.batch.named_results.design_forces import output_link
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
-from planar.batch.reductions.reduced_sweep import (
+from planar.batch.reductions import (
     ReducedSweep,
     Reduction,
     Reductions,

@@ -18,7 +18,7 @@ from planar.batch.mechanisms.part_runs import solve_part
 from planar.batch.mechanisms.pins import result_pins
 from planar.batch.mechanisms.results import Each, SweptPart
 from planar.batch.mechanisms.tape_runs import make_values
-from planar.batch.reductions.reduced_sweep import (
+from planar.batch.reductions import (
     ReducedBlock,
     ReducedSweep,
     Reduction,

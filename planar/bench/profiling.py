@@ -16,9 +16,9 @@ SWEEP_PARTS: dict[FunctionKey, str] = {
     ("batch", "initial_assembly.py", "find_assemblies"): "assembling the starts",
     ("march", "runs.py", "run_compiled"): "machine code",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
-    ("closed_form", "ends.py", "find_ends"): "finding dead points in closed form",
-    ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",
-    ("batch", "general_path.py", "solve_design"): "the general path",
+    ("batch", "design_ends.py", "follow_to_ends"): "finding dead points in closed form",
+    ("batch", "design_ends.py", "follow_to_dead_points"): "following designs to where they stop",
+    ("batch", "general_path.py", "solve"): "the general path",
 }
 """Functions of a sweep, and what they do; the time of one that another calls is not the other's."""
 

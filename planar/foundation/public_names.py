@@ -122,7 +122,7 @@ MODULES = {
     "PreparedSweep": "batch.prepared",
     "RackPair": "model.pairs.rack",
     "Reaction": "dynamics.reactions",
-    "ReducedSweep": "batch.reductions.reduced_sweep",
+    "ReducedSweep": "batch.reductions",
     "RelativeState": "results.records",
     "RubbingPair": "dynamics.in_time.friction_record",
     "RunGradient": "batch.gradients.run_gradients",

@@ -9,7 +9,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.general_path import solve_design
+from planar.batch.general_path import DesignRun
 from planar.batch.reference_design import reference_design
 from planar.document.revised.changed_numbers import with_values
 from tests.cams import FOLLOWERS, cam_document
@@ -183,7 +183,7 @@ def test_many_designs_of_a_cam_are_what_the_general_path_says(follower):
     for index in range(many):
         own = with_design_values(base.mechanism, values_of_design(designs, index))
         row = np.broadcast_to(swept.input, swept.status.shape)[index]
-        alone = solve_design(own, base.pair, row, 40, (float(row[0]), float(row[-1])), swept.points, True)
+        alone = DesignRun(own, base.pair, row, 40).solve(swept.points, True)
         assert alone.status.tolist() == swept.status[index].tolist()
         orders = (swept.position, swept.velocity, swept.acceleration)
         found = np.hstack([order[name][index] for order in orders for name in swept.points])

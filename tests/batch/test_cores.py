@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.batch import executor
 from planar.batch.executor import run_tasks, usable_cores
-from planar.batch.reductions.point_reductions import fourier_descriptors
+from planar.batch.reductions import fourier_descriptors
 from planar.foundation.errors import BadInput
 from planar.foundation.turns import leave_turn, take_turn
 from tests.builders import four_bar
@@ -225,16 +225,16 @@ def test_equal_curves_have_equal_descriptors_wherever_they_lie_and_begin():
 
 
 def test_only_what_measures_need_is_solved(monkeypatch):
-    from planar.batch.reductions import reduced_sweep
+    from planar.batch import reductions
 
     asked = []
-    really = reduced_sweep.solve_result_block
+    really = reductions.solve_result_block
 
     def noted(block, out):
         asked.append((block.designs.points, block.designs.rates))
         return really(block, out)
 
-    monkeypatch.setattr(reduced_sweep, "solve_result_block", noted)
+    monkeypatch.setattr(reductions, "solve_result_block", noted)
     mechanism = four_bar(*ROCKER, 0.8)
     for measure, rates in (("path_length", False), ("speed_extremes", True)):
         planar.sweep(mechanism, {"BC.length": [0.9]}, 12, reduce={"kept": f"BC.E.{measure}"})

@@ -8,7 +8,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import with_design_values
-from planar.batch.general_path import solve_design
+from planar.batch.general_path import DesignRun
 from planar.batch.prepare.design_numbers import compiled_variables
 from planar.foundation.errors import BadInput
 from tests.builders import open_four_bar
@@ -37,7 +37,7 @@ def agree_with_general_path(ready, values, start=None, stop=None):
     start = mechanism.inputs[reference.running_index].position if start is None else start
     stop = start + FULL_TURN if stop is None else stop
     grid = np.linspace(start, stop, ready.steps + 1)
-    wanted = solve_design(mechanism, reference.pair, grid, ready.steps, (start, stop), ready.points, True)
+    wanted = DesignRun(mechanism, reference.pair, grid, ready.steps).solve(ready.points, True)
     np.testing.assert_array_equal(found.status, wanted.status)
     rows = np.split(wanted.out, 3, axis=1)
     for order, row, near in zip(found[:3], rows, (1e-9, 1e-6, 1e-4), strict=True):

@@ -144,7 +144,11 @@ def test_many_random_dyads_end_where_their_cycles_end():
     assert ends == {Outcome.SOLVED, Outcome.DEAD_POINT}
     stopped = [each for each in result if each.status.any() and not each.general]
     assert stopped
-    assert all("come to a dead point" in each.reason for each in stopped)
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        names, is_dead, _ = found.reason.removeprefix("links ").partition(" come to a dead point")
+        links = names.split(", ")
+        assert found.general or bool(is_dead) == found.status.any()
+        assert not is_dead or links == [link.name for link in mechanism.links if link.name in links]
     for mechanism, found in zip(mechanisms, result, strict=True):
         as_cycle(mechanism, found, 40, result.outcomes, 1e-8)
 

@@ -7,7 +7,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.general_path import OUTCOMES, solve_design
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.model.mechanism import relative_motions
@@ -29,8 +29,7 @@ def agrees_with_general_path(mechanism, designs, steps, pair=None, start=None, s
         own = with_design_values(base.mechanism, values_of_design(designs, index))
         row = np.broadcast_to(swept.input, swept.status.shape)[index]
         grid = None if base.is_sliding and stop is None else row
-        ends = (start, stop) if grid is None else (float(row[0]), float(row[-1]))
-        alone = solve_design(own, base.pair, grid, steps, ends, swept.points, True)
+        alone = DesignRun(own, base.pair, grid, steps, start=start).solve(swept.points, True)
         assert alone.status.tolist() == swept.status[index].tolist(), (index, str(alone.message))
         found = np.hstack([o[n][index] for o in (swept.position, swept.velocity) for n in swept.points])
         wanted = alone.out[:, : found.shape[1]]
@@ -113,8 +112,7 @@ def test_mechanisms_of_one_list_end_at_their_stops():
     ]
     found = planar.sweep_each(cases, 72)
     for mechanism, each in zip(cases, found, strict=True):
-        grid = np.asarray(each.input)
-        alone = solve_design(mechanism, "A", grid, 72, (float(grid[0]), float(grid[-1])), ("C",), False)
+        alone = DesignRun(mechanism, "A", np.asarray(each.input), 72).solve(("C",), False)
         np.testing.assert_array_equal(each.status, alone.status)
         np.testing.assert_allclose(each.position["C"], alone.out, atol=1e-12)
     assert not all(each.general for each in found)

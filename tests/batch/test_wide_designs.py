@@ -5,7 +5,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.general_path import solve_design
+from planar.batch.general_path import DesignRun
 from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import Outcome
@@ -32,8 +32,7 @@ def agrees_with_general_path(mechanism, designs, steps, **more):
         own = with_design_values(base.mechanism, values_of_design(designs, index))
         row = np.broadcast_to(swept.input, swept.status.shape)[index]
         grid = None if base.is_sliding else row
-        ends = (None, None) if grid is None else (float(row[0]), float(row[-1]))
-        alone = solve_design(own, base.pair, grid, steps, ends, swept.points, swept.velocity is not None)
+        alone = DesignRun(own, base.pair, grid, steps).solve(swept.points, swept.velocity is not None)
         assert alone.status.tolist() == swept.status[index].tolist(), (index, alone.message)
         orders = [each for each in (swept.position, swept.velocity, swept.acceleration) if each is not None]
         found = np.hstack([order[name][index] for order in orders for name in swept.points])
@@ -127,13 +126,13 @@ def test_ranges_of_different_lengths_and_starts_far_off():
 
 
 def test_sentences_are_made_when_they_are_read(monkeypatch):
-    asked = []
+    asked, solve = [], DesignRun.solve
 
     def counted(*arguments):
         asked.append(arguments)
-        return solve_design(*arguments)
+        return solve(*arguments)
 
-    monkeypatch.setattr("planar.batch.general_path.solve_design", counted)
+    monkeypatch.setattr(DesignRun, "solve", counted)
     found = planar.sweep(four_bar(CRANK, COUPLER, ROCKER, GROUND, FIRST), random_four_bars(100)[1], 200, rates=False)
     assert not asked
     dead, open_ = found.remarks[::-1]

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 import planar
-from planar.batch.general_path import OUTCOMES, solve_design
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.reports.tables.modes import table
 
 DEG = np.pi / 180.0
@@ -150,7 +150,7 @@ def test_sweeps_have_the_statuses_of_the_general_path():
     assert stop in found.status
     for k, (length, upper) in enumerate(zip(lengths, uppers, strict=True)):
         own = mechanism.with_values({"BC.length": length, "D.stops.1": upper})
-        told = solve_design(own, "A", found.input, 72, (found.input[0], found.input[-1]), ("C",), False)
+        told = DesignRun(own, "A", found.input, 72).solve(("C",), False)
         assert np.array_equal(told.status, found.status[k])
     (each,) = planar.sweep_each([mechanism], 72)
     assert stop in each.status

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache, reduce
 from math import inf, nan
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -21,9 +20,8 @@ from planar.batch.march.kernel import KernelEquations, operand_rows
 from planar.batch.march.kernel_writer import OperandNames
 from planar.codegen.llvm_ir import write_cos_sin
 from planar.equations.generic_evaluation import FORMULA_OPERATIONS, inline_function
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.instruction_list import InstructionList, required_values
-
-Array = np.ndarray
 
 LEAST_INTERVALS = 3
 """Intervals that are safe one after the other before longer ones are looked at."""
@@ -66,15 +64,6 @@ Changes = Mapping[Slot, ca.SX | float]
 """What is put into slots."""
 
 
-class DeadPoints(NamedTuple):
-    """How far designs surely go (designs,), rad or sizes from their start: to a dead point, or infinitely where there
-    is none up to the end; not a number where that is not decided. And the block that ends it, else -1; behind the
-    blocks are the pairs with stops, which end designs alike, and then the input that runs with its own."""
-
-    distance: Array
-    block: Array
-
-
 @lru_cache(maxsize=256)
 def _write_search(equations: KernelEquations, index: int) -> str:
     return DeadPointWriter(equations, index).write()
@@ -82,10 +71,13 @@ def _write_search(equations: KernelEquations, index: int) -> str:
 
 def search_dead_points(
     equations: KernelEquations, index: int, batch: DesignBatch, signs: Array, ranges: tuple[Array, ...]
-) -> DeadPoints:
-    """The first dead points of designs in the assemblies of these signs (blocks, designs), of none that goes no way.
+) -> tuple[Array, IntArray]:
+    """The first dead points of designs in the assemblies of these signs (blocks, designs): their distances from where
+    the designs start, rad or sizes, and the blocks that come to them, each (designs,).
 
-    `index` is the input that runs; ranges are `RANGES`, each (designs,), rad or sizes, from where the designs start.
+    The distance is infinite if there is none in the range, and NaN if that is not decided, or if there is no range. The
+    numbers of pairs with stops, which end designs alike, follow those of blocks; -1 stands for none. `index` is the
+    input that runs; ranges are `RANGES`, each (designs,), rad or sizes, from where the designs start.
     """
     reached, span, longest, _ = ranges
     with np.errstate(all="ignore"):
@@ -94,7 +86,7 @@ def search_dead_points(
     rows = (batch.numbers, operand_rows(equations.input_operands, batch.u0), signs, np.stack(ranges))
     distance, number = call_with_designs(_write_search(equations, index), SEARCH_NAME, rows, most, 2)
     owners = np.array([*watched_blocks(equations), -1])  # the last one of none
-    return DeadPoints(np.where(span > 0.0, distance, np.nan), owners[number.astype(int)])
+    return np.where(span > 0.0, distance, np.nan), owners[number.astype(int)]
 
 
 def watched_blocks(equations: KernelEquations) -> list[int]:
@@ -106,7 +98,7 @@ def watched_blocks(equations: KernelEquations) -> list[int]:
 
 class DeadPointWriter(BlockJoinWriter):
     """The text of search(blocks, last, width, p, drive, sign, ranges, most, out) for designs whose input `index` runs,
-    of which `most` places are looked at; see `DeadPoints` for what it gives."""
+    of which `most` places are looked at; see `search_dead_points` for the results."""
 
     def __init__(self, equations: KernelEquations, index: int):
         super().__init__(equations, (), None)

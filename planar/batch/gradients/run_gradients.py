@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.design_arrays import read_designs, split_into_blocks, with_design_values
-from planar.batch.general_path import OUTCOMES, run_design
+from planar.batch.general_path import OUTCOMES, DesignRun
 from planar.batch.gradients.compiled_gradient import GradientWriter, run_designs
 from planar.batch.prepare.compiled_runs import (
     ALL_SOLVED,
@@ -232,7 +232,7 @@ class RunGradients:
         begin = float(mechanism.inputs[self.reference.running_index].position) if start is None else float(start)
         length = 2.0 * np.pi if stop is None else stop - begin
         grid = begin + length * np.linspace(0.0, 1.0, len(self._positions))
-        result = run_design(mechanism, self.reference.pair, grid, len(grid) - 1, (float(grid[0]), float(grid[-1])))
+        result = DesignRun(mechanism, self.reference.pair, grid, len(grid) - 1).run()
         status: IntArray = np.array(result.status)
         value, total = 0.0, np.zeros(len(self.names))
         if result.motion is not None and result.row_count:

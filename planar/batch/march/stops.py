@@ -152,12 +152,12 @@ def are_periodic(pairs: Sequence[Pair], mechanism: Mechanism) -> tuple[bool, ...
 
 
 def nearest_end(
-    distance: Array, end: Array, rooms: Array, lengths: Array | float, input_end: int
-) -> tuple[Array, Array]:
-    """Where designs end (designs,), and by what: there, or where the input meets a stop of its own within a range of
-    these lengths (as `input_end`), whichever is nearer; not a number where that is not clear."""
+    distance: Array, is_stopped: BoolArray, rooms: Array, lengths: Array | float
+) -> tuple[Array, BoolArray]:
+    """The distances of the ends of designs and which of them are stops (designs,): those given, or where the input
+    meets a stop of its own within a range of these lengths if that is nearer; NaN if that is not clear."""
     nearest = np.fmin(distance, lengths)
     stops = rooms < lengths - SAME_END
     unclear = stops & (np.abs(rooms - nearest) < SURE_DISTANCE)
     first = stops & ~np.isnan(distance) & (rooms < nearest)
-    return np.where(unclear, np.nan, np.where(first, rooms, distance)), np.where(first, input_end, end)
+    return np.where(unclear, np.nan, np.where(first, rooms, distance)), is_stopped | first

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.prediction import CLEAR_REGULARITY
-from planar.batch.mechanisms.block_tapes import LEAST_CLEARANCE, make_block_kinds, make_tape
 from planar.batch.mechanisms.block_type import (
     COS,
     JUDGED_ROWS,
@@ -20,7 +19,15 @@ from planar.batch.mechanisms.block_type import (
     squared_sketch_distance,
 )
 from planar.batch.mechanisms.linkages import BlockBatch, LinkageArrays, LinkArrays
-from planar.batch.mechanisms.tape_runs import STEP_TABLE, TapedLinkages, rotations, run_steps
+from planar.batch.mechanisms.tape_runs import (
+    LEAST_CLEARANCE,
+    STEP_TABLE,
+    TapedLinkages,
+    make_block_kinds,
+    make_tape,
+    rotations,
+    run_steps,
+)
 from planar.codegen.tape import LANES
 from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.geometry import GROUND, Frame, frame_at

@@ -1,34 +1,140 @@
-"""Mechanisms of a part solved: pinned bars pin by pin, others block by block, what is left by the general path."""
+"""Solve the mechanisms of a part: pinned bars pin by pin, others block by block, the rest by the general path."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.general_path import SolvedDesign, solve_design
-from planar.batch.mechanisms.block_runs import note_dead_links, prepare_blocks
-from planar.batch.mechanisms.initial_assembly import find_linkage_assemblies
-from planar.batch.mechanisms.linkages import LinkageArrays, SweepRequest, make_linkage_arrays
+from planar.batch.general_path import DesignRun, SolvedDesign
+from planar.batch.march.stops import SURE_DISTANCE, TURN
+from planar.batch.mechanisms.initial_assembly import LinkageAssemblies, find_linkage_assemblies
+from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, SweepRequest, make_linkage_arrays, watched_links
 from planar.batch.mechanisms.pins import frame_pins, make_pin_tape, prepare_pins, result_pins
-from planar.batch.mechanisms.results import PointTable, SweptPart
+from planar.batch.mechanisms.results import PointTable, SweptPart, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
     DEAD_POINT_NUMBER,
+    STEP_TABLE,
     Endings,
+    LinkageEnding,
     PreparedTape,
     clear_points,
+    make_block_kinds,
+    make_tape,
     make_values,
     run_taped_linkages,
+    temporary_slots,
 )
-from planar.foundation.arrays import Array, IntArray
+from planar.batch.named_results.design_frames import DesignFrames
+from planar.equations.mechanism_numbers import shapes_of_links
+from planar.foundation.arrays import Array, IntArray, part_offsets
+from planar.foundation.errors import Outcome
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import PointName
-from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
+from planar.model.mechanism import Mechanism, links_counting_turns, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind
 from planar.model.pin_linkage import PinnedMechanism
 from planar.model.pin_linkages import PinnedLinkages
+from planar.solving.stops import PairStops
+
+
+def prepare_blocks(
+    arrays: LinkageArrays, assemblies: LinkageAssemblies, points: PointTable, pair: str | None
+) -> PreparedTape:
+    """Prepare the tape of linkages that are solved block after block, with the input that runs at `pair`; `points` are
+    the results of the part.
+
+    Behind their rows are those of the points of links that decide where pairs with stops are.
+    """
+    results = arrays.points([points.names(k) for k in arrays.which.tolist()])
+    first_result = part_offsets(np.bincount(results.owner, minlength=len(arrays)))
+    rows = np.arange(len(results.owner)) + (points.first[arrays.which] - first_result[:-1])[results.owner]
+    watched = arrays.watched_points
+    first_watched = points.first[-1] + part_offsets(np.bincount(watched.owner, minlength=len(arrays)))
+    rows = np.concatenate([rows, np.arange(first_watched[0], first_watched[-1])])
+    tape_points = LinkArrays(
+        np.concatenate([results.owner, watched.owner]),
+        np.concatenate([results.link_index, watched.link_index]),
+        np.concatenate([results.numbers, watched.numbers]),
+    )
+    taped = make_tape(
+        arrays, assemblies.block_numbers, temporary_slots, [STEP_TABLE] * len(arrays.batches), tape_points, rows
+    ).select(np.flatnonzero(assemblies.is_sure))
+    find_endings = {
+        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), pair)
+        for k in np.flatnonzero(np.diff(first_watched)).tolist()
+    }
+    types = [batch.block_type for batch in arrays.batches]
+    return PreparedTape(taped, partial(make_block_kinds, types), find_endings)
+
+
+def note_dead_links(arrays: LinkageArrays, endings: Endings) -> None:
+    """Note the reasons of linkages with blocks that come to a dead point."""
+    is_dead = (endings.solved >= 0) & (endings.outcome == DEAD_POINT_NUMBER)
+    for number in arrays.which[is_dead[arrays.which]].tolist():
+        links = arrays.links_of_block(int(endings.links[number, 0]))
+        endings.reasons[number] = dead_point_reason(links, endings.start[number] + endings.near[number])
+
+
+def _find_ending(
+    arrays: LinkageArrays,
+    k: int,
+    rows: IntArray,
+    running_pair: str | None,
+    rotation: Array,
+    point_places: Callable[[IntArray], Array],
+    good: int,
+) -> LinkageEnding | None:
+    """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
+    sure."""
+    mechanism, unit = arrays.mechanisms[k], float(arrays.unit[k])
+    stops, counted = PairStops(mechanism, unit), links_counting_turns(mechanism)
+    u = {given.pair: np.full((good, 1), given.position) for given in mechanism.inputs}
+    is_long = stops.high - stops.low > TURN + SURE_DISTANCE
+    if any(
+        not counted.isdisjoint(pair.bodies) or (pair_is_long and pair.name not in u)
+        for pair, pair_is_long in zip(stops.pairs, is_long.tolist(), strict=True)
+    ):
+        return None
+    positions = arrays.start[k] + rotation
+    u[mechanism.inputs[running_input_index(mechanism, running_pair, "inputs")].pair] = positions[:good, None]
+    places = np.moveaxis(point_places(rows)[..., :good], 1, 2)[:, None, :, :, None]
+    points = {link: (places[2 * n], places[2 * n + 1]) for n, link in enumerate(watched_links(mechanism))}
+    frames = DesignFrames(mechanism, shapes_of_links(mechanism), u, points, unit)
+    if not frames.is_clear[0]:
+        return None
+    values = np.array([frames.pair_value(pair.name)[0][:, 0] for pair in stops.pairs])
+    ending = _find_first_stop(stops, values, np.array([angle[:, 0] for angle in frames.angles.values()]))
+    if ending is None or (ending.outcome is Outcome.SOLVED and good < len(positions)):
+        return None  # beside a dead point it is not clear which comes first
+    if ending.outcome is Outcome.SOLVED:
+        return ending
+    near = between(positions[[max(ending.solved_steps - 1, 0), ending.solved_steps]])
+    return ending._replace(reason=f"{ending.reason}, {near}")
+
+
+def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageEnding | None:
+    """The ending at the first stop, by the values of pairs with stops (stops, steps) and the angles of links (links,
+    steps); None if that is not clear."""
+    low, high, scale = (bound[:, None] for bound in (stops.low, stops.high, stops.scale))
+    counted_values = values + stops.turns(values[:, 0])[:, None]
+    distances = np.minimum(counted_values - low, high - counted_values) / scale
+    nearest = distances.min(axis=0)
+    if nearest[0] < -SURE_DISTANCE:
+        return LinkageEnding(0, Outcome.STOP, stops.describe_met(values[:, 0]))
+    is_sure = stops.sure_rows(values, np.vstack([angles, values / scale]).T)
+    if is_sure.all():
+        return LinkageEnding(len(is_sure))
+    first = int(np.argmin(is_sure))
+    if first < 2 or nearest[first - 1] < SURE_DISTANCE or nearest[first] > -SURE_DISTANCE:
+        return None
+    k = int(np.argmin(distances[:, first]))
+    is_upper = bool(values[k, first] > values[k, first - 1])
+    return LinkageEnding(first, Outcome.STOP, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units))
+
 
 Mechanisms = Sequence[Mechanism] | PinnedLinkages
 
@@ -193,5 +299,4 @@ def _solve_by_general_path(mechanism: Mechanism, names: Sequence[PointName], req
     pair, grid = inputs[running].pair, None
     if relative_motions(mechanism)[pair].input_kind is not MeasureKind.LENGTH:
         grid = inputs[running].position + np.linspace(0.0, request.turn, request.steps + 1)
-    ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
-    return solve_design(mechanism, pair, grid, request.steps, ends, tuple(names), request.rates)
+    return DesignRun(mechanism, pair, grid, request.steps).solve(tuple(names), request.rates)

@@ -37,7 +37,7 @@ class NotPartitionable(Exception):
 
 class PartitionBlock(NamedTuple):
     """One block of a mechanism: its type; the places of its given links, inputs and inner links; where the numbers of
-    its pairs are among those of the mechanism; and the names of its inner links."""
+    its pairs are among those of the mechanism; and the names of its inner links, in the order of the mechanism."""
 
     block_type: BlockType
     link_indices: tuple[int, ...]
@@ -439,7 +439,7 @@ class _Partitioner:
         self.place_count += len(inner)
         for link, place in zip(inner, inner_places, strict=True):
             self._place(link, place)
-        names = tuple(self.names[link] for link in inner)
+        names = tuple(self.names[link] for link in sorted(inner))
         self.blocks.append(PartitionBlock(block_type, (*given, *inputs, *inner_places), tuple(numbers), names))
 
     def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool]]]:

@@ -172,7 +172,7 @@ class SweptPart:
             return self.endings.reasons[k]
         if self.endings.solved[k] > self.steps:
             return ""
-        links = ", ".join(f"bar{bar}" for bar in self.endings.links[k])
+        links = ", ".join(f"bar{bar}" for bar in sorted(self.endings.links[k]))
         return dead_point_reason(links, self.endings.start[k] + self.endings.near[k])
 
 

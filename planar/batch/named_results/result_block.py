@@ -20,8 +20,6 @@ from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.geometry import Vector
 from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkPlace
-from planar.results.motion import Motion
-from planar.solving.cycle import cycle
 
 LEAST_STROKE_STEPS = 24
 """Steps of a stroke between limits of its own, so that they show how links turn."""
@@ -142,7 +140,7 @@ class _ResultBlockSolver:
             timed = input_motions(self.mechanism, block, block.time)[0]
             moved = np.abs(np.diff(timed, axis=1)) / reference.input_scale[:, None, None]
             return max(1, ceil(float(np.max(moved)) / LONGEST_STEP - 1e-9))
-        if reference.is_sliding and block.stop is None:
+        if block.has_own_ranges:
             return ceil(LEAST_STROKE_STEPS / block.steps)
         inputs = reference.design_rows(block.designs, self.design_count).u
         scale = float(reference.input_scale[reference.running_index])
@@ -179,18 +177,9 @@ class _ResultBlockSolver:
         angles = np.full((len(self.links), steps + 1, designs.size), np.nan)
         for k, index in enumerate(designs):
             count = int(np.argmax(part.status[index] != 0)) if part.status[index].any() else steps + 1
-            angles[:, :count, k] = link_angles(self._motion(part, int(index), steps), self.links)[:, :count]
+            motion = part.block._replace(steps=steps).design_run(int(index), part.input).motion()
+            angles[:, :count, k] = link_angles(motion, self.links)[:, :count]
         frames.replace_angles(designs, dict(zip(self.links, angles, strict=True)))
-
-    def _motion(self, part: _SolvedPart, index: int, steps: int) -> Motion:
-        """The motion of one design, by itself."""
-        mechanism = part.block.single_design(index)
-        if self.block.duration is not None:
-            return cycle(mechanism, steps, duration=self.block.duration)
-        if self.reference.is_sliding and self.block.stop is None:
-            return cycle(mechanism, steps, self.block.start, None, self.reference.pair)
-        grid = part.input if part.input.ndim == 1 else part.input[index]
-        return cycle(mechanism, steps, float(grid[0]), float(grid[-1]), self.reference.pair)
 
     def _write_results(self, frames: DesignFrames, part: _SolvedPart, out: Array, refined: int) -> None:
         """Write the results into rows of out (steps + 1, rows, designs); derivatives that are marched stand last."""

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.design_arrays import with_design_values
-from planar.batch.design_stops import stop_ranges
+from planar.batch.design_ends import stop_ranges
 from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
 from planar.batch.march.stops import LEAST_RANGES, SURE_DISTANCE, TURN, stop_limits
 from planar.batch.reference_design import ReferenceDesign

@@ -7,9 +7,11 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -39,12 +41,13 @@ INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
 """What stands for that in a status."""
 
 
-class SweepPlan(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SweepPlan:
     """A sweep as one block of all its designs, and how many of them are solved together."""
 
     all_designs: DesignBlock
     block_size: int
-    results: RequestedResults = RequestedResults()
+    results: RequestedResults
     assemblies: ListedAssemblies | None = None
 
     @property
@@ -74,7 +77,7 @@ class SweepPlan(NamedTuple):
         """What is told of every point."""
         return POINT_QUANTITIES if self.all_designs.rates else POINT_QUANTITIES[:1]
 
-    @property
+    @cached_property
     def rows(self) -> tuple[ResultRow, ...]:
         """What is told at a step in the order of the numbers: of all points, then beside them."""
         points = (
@@ -225,7 +228,7 @@ class FolderStore(BlockStore):
             if not isinstance(size, int) or size < 1:
                 reason = "holds something else than this sweep; name another store, or take it away first"
                 raise BadInput("store", f"{path} {reason}")
-            self.plan = plan._replace(block_size=size)
+            self.plan = replace(plan, block_size=size)
         else:
             with reporting_write_errors(path):
                 self.write_about({"fingerprint": self.fingerprint, "block": plan.block_size})
