@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.design_frames import DesignFrames
 from planar.batch.general_path import DesignRun, SolvedDesign
 from planar.batch.march.stops import SURE_DISTANCE, TURN
 from planar.batch.mechanisms.initial_assembly import LinkageAssemblies, find_linkage_assemblies
@@ -28,7 +29,6 @@ from planar.batch.mechanisms.tape_runs import (
     run_taped_linkages,
     temporary_slots,
 )
-from planar.batch.named_results.design_frames import DesignFrames
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.arrays import Array, IntArray, part_offsets
 from planar.foundation.errors import Outcome

@@ -161,7 +161,8 @@ def run_taped_linkages(
     for refinement, polished in ATTEMPTS if len(undecided) else ():
         finer = max(ceil(abs(turn) / steps / LONGEST_INPUT_STEP), 1) * refinement
         for indices in _chunks(taped, undecided, padded_steps(steps * finer + 1) * values.shape[1] * 8, finer > 1):
-            _run_once(taped.select(indices), kinds, polished, values, steps, finer, endings, tape.find_endings, turn)
+            part = tape._replace(taped=taped.select(indices))
+            _run_once(part, kinds, polished, values, steps, finer, endings, turn)
         undecided = undecided[endings.solved[taped.which[undecided]] < 0]
         if not undecided.size:
             break
@@ -227,18 +228,17 @@ def rotations(count: int, turn: float) -> Array:
 
 
 def _run_once(
-    taped: TapedLinkages,
+    tape: PreparedTape,
     kinds: BlockKinds,
     polished: bool,
     values: Array,
     steps: int,
     finer: int,
     endings: Endings,
-    find_endings: Mapping[int, FindEnding],
     turn: float,
 ) -> None:
     """Run linkages with steps divided by a factor, and note the endings of those that this decides."""
-    count, points = steps * finer + 1, values
+    taped, count, points = tape.taped, steps * finer + 1, values
     if finer > 1:
         is_result = taped.slots >= 0
         rows, places = np.unique(taped.slots[is_result], return_inverse=True)
@@ -259,10 +259,10 @@ def _run_once(
         indices = np.searchsorted(rows, result_rows) if finer > 1 else result_rows
         return points[indices, :2, :count]
 
-    for k, number in enumerate(which.tolist()) if find_endings else ():
-        if number not in find_endings or not good[k]:
+    for k, number in enumerate(which.tolist()) if tape.find_endings else ():
+        if number not in tape.find_endings or not good[k]:
             continue
-        ending = find_endings[number](rotation[:count], point_places, int(good[k]))
+        ending = tape.find_endings[number](rotation[:count], point_places, int(good[k]))
         if ending is None:
             endings.solved[number] = -1
             continue

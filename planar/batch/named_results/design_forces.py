@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
-from planar.batch.named_results.design_frames import DesignFrames, pair_arguments, solve_own_coordinates
+from planar.batch.design_frames import DesignFrames, pair_arguments, solve_own_coordinates
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
 from planar.derivatives.transmission_system import can_drive, force_point, loaded_output, output_angle, undriven_output
 from planar.dynamics.external_actions import KinematicArrays

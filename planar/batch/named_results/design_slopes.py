@@ -18,12 +18,12 @@ import numpy as np
 
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.design_arrays import split_into_blocks
+from planar.batch.design_frames import DesignFrames
 from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import Operand
 from planar.batch.march.kernel_writer import KernelWriter
 from planar.batch.march.runs import run_designs
 from planar.batch.named_results.design_forces import position_chunks
-from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults, derivative_name
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.llvm_compile import allocate_aligned

@@ -9,10 +9,10 @@ import numpy as np
 
 from planar.batch.block import FULL_TURN, DesignBlock, DesignBlockSolver, SolvedDesigns, input_motions
 from planar.batch.design_arrays import split_into_blocks, with_design_values
+from planar.batch.design_frames import DesignFrames
 from planar.batch.general_path import link_angles
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_forces import find_forces, output_link
-from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, NamedArrays, RequestedResults
 from planar.codegen.llvm_compile import allocate_aligned
