@@ -19,7 +19,7 @@ from planar.results.motion import Motion, State
 from planar.solving.continuation.fast_path import resting_inputs
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
-from planar.solving.runs.samples import moving_jets, rows_with_rates, run_unknowns
+from planar.solving.samples import moving_jets, rows_with_rates, run_unknowns
 
 CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""

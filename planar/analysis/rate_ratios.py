@@ -11,7 +11,7 @@ from planar.analysis.polygons.loop_equations import loop_equations
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquations, moving_links, turning_classes
 from planar.analysis.vector_chains import KnownRates, VectorChains
 from planar.foundation.arrays import Array
-from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
+from planar.solving.checks import SINGULAR_TOLERANCE
 
 ROUNDING = 1e-15
 """What equations and slopes are exact to, in the mechanism's size."""

@@ -30,7 +30,7 @@ from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
-from planar.solving.runs.samples import input_law_rates
+from planar.solving.samples import input_law_rates
 
 Array = np.ndarray
 

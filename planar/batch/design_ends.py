@@ -30,7 +30,7 @@ from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import BoolArray, IntArray
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
+from planar.solving.checks import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.continuation.predictor_corrector import (
     FIRST_STEP,
     LONGEST_STEP,

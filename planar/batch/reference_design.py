@@ -34,7 +34,7 @@ from planar.model.mechanism import (
 from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
+from planar.solving.checks import SHORT_ARM, residual_tolerance
 from planar.solving.position import PositionSolver, solved_mechanism
 
 Array = np.ndarray

@@ -22,7 +22,7 @@ from planar.derivatives.kinematic_slopes import (
 from planar.dynamics.external_actions import effort_actions
 from planar.dynamics.forces import Forces
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.equations.coordinates import FRAME_PARTS
 from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import scale_lengths

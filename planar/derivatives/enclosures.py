@@ -25,8 +25,7 @@ from typing import Any, NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import BufferedFunction
-from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
+from planar.equations.casadi_functions import OPERATIONS, BufferedFunction, evaluate_function
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import BadInput
 from planar.foundation.generalised_inverses import invert_matrices

@@ -26,12 +26,12 @@ from planar.dynamics.friction.contact_functions import ContactFunctions, Contact
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_variation import CoursePiece, course_piece, load_factors
 from planar.dynamics.saddle_point import SaddlePattern, SaddleSystem, unit_pattern
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
-from planar.solving.runs.samples import input_law_rates
+from planar.solving.samples import input_law_rates
 from planar.solving.stops import MetStop
 
 RANK_TOLERANCE = 1e-9

@@ -13,7 +13,7 @@ from planar.foundation.errors import NoAnswer
 from planar.foundation.piecewise_series import PiecewiseSeries, fit_series
 from planar.model.mechanism import relative_motions
 from planar.results.motion import Motion
-from planar.solving.runs.samples import ContinuousRun
+from planar.solving.samples import ContinuousRun
 
 TURN_TOLERANCE = 1e-9
 """rad: what rounding leaves of a turn that the places of a load span."""

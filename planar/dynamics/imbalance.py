@@ -6,7 +6,7 @@ from planar.dynamics.reaction_solver import ReactionSolver
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.mechanism import Mechanism
 from planar.model.wording import quote_names
-from planar.solving.assembly.sketch_remarks import links_held_to_second_order
+from planar.solving.assembly.nearest_assembly import links_held_to_second_order
 from planar.solving.position import solved_mechanism
 
 

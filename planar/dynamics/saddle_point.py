@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.equations.sparse_matrices import SparseMatrices, SparsePattern, factorised
+from planar.equations.sparse_matrices import NORM_SAFETY, SparseMatrices, SparsePattern, factorised, norm_by_powers
 from planar.foundation.arrays import Array, IntArray
-from planar.solving.continuation.bordered_jacobian import NORM_SAFETY, norm_by_powers
 
 
 class SaddlePattern:

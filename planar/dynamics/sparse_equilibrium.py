@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.equations.sparse_matrices import SparseMatrices, factorised
+from planar.equations.sparse_matrices import NORM_SAFETY, SparseMatrices, factorised, norm_by_powers
 from planar.foundation.arrays import Array
-from planar.solving.continuation.bordered_jacobian import NORM_SAFETY, norm_by_powers
 
 if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU

@@ -34,7 +34,7 @@ def derive_block_motion(e: ConstraintEquations) -> RecordedFormula:
     `PreparedMechanism.jacobian_regularity`) and the least singular value, no more than they are, by how much round-off
     is greater in the rates, and how far in such steps as u1 the block is regular, with the sign of its determinant.
     """
-    from planar.equations.generic_evaluation import recorded_function
+    from planar.equations.casadi_functions import recorded_function
     from planar.equations.rates import UnknownRates, first_and_second_rates
 
     u1, u2 = (ca.SX.sym(name, e.u.numel()) for name in ("u1", "u2"))

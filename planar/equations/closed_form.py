@@ -18,9 +18,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import formula_text
+from planar.equations.casadi_functions import formula_text, is_piecewise_in, recorded_function
 from planar.equations.elimination import stack_expressions
-from planar.equations.generic_evaluation import is_piecewise_in, recorded_function
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.generic_numbers import generic_numbers

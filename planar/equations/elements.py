@@ -281,7 +281,7 @@ class _ElementDerivation:
 
 
 def _recorded(arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -> RecordedFormula:
-    from planar.equations.generic_evaluation import recorded_function  # most elements are known
+    from planar.equations.casadi_functions import recorded_function  # most elements are known
 
     return recorded_function(ca.Function("formula", arguments, [ca.densify(stack_expressions(results))]))
 

@@ -55,8 +55,8 @@ def _record_expressions(e: ConstraintEquations) -> tuple[RecordedFormula, Record
     """The same formulas of equations that no elements stand for: of least misfit, or with rank conditions."""
     import casadi as ca  # few structures have such equations
 
+    from planar.equations.casadi_functions import recorded_function
     from planar.equations.elimination import stack_expressions
-    from planar.equations.generic_evaluation import recorded_function
 
     entries = stack_expressions(e.jacobian.nz[k] for k in range(e.jacobian.nnz()))
     closing, coordinates = (

@@ -7,7 +7,7 @@ from math import isnan
 import casadi as ca
 
 from planar.codegen.printed_formula import FormulaFunction, write_operation
-from planar.equations.generic_evaluation import recorded_function
+from planar.equations.casadi_functions import recorded_function
 from planar.foundation.instruction_list import required_values
 
 JS_OPERATIONS = {

@@ -60,7 +60,7 @@ from planar.solving.continuation.predictor_corrector import (
 )
 from planar.solving.diagnosis import refusals
 from planar.solving.position import PositionSolver, solved_mechanism, stopped_at_start
-from planar.solving.runs.samples import ContinuousRun, build_motion, timed_inputs
+from planar.solving.samples import ContinuousRun, build_motion, timed_inputs
 
 MAX_DURATION = 1e6
 """s"""

@@ -18,7 +18,7 @@ from planar.equations.functions import EquationFunctions
 from planar.equations.rank_conditions import LowRankBlock, constraint_dependencies, with_rank_conditions
 from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
-from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
+from planar.solving.checks import MIN_REGULARITY, column_norms, null_space, rank
 from planar.solving.newton import correct_position
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -25,7 +25,7 @@ from planar.foundation.jets import Scalar
 from planar.model.link_shapes import fitted_frame
 from planar.model.mechanism import Mechanism, named_points, pair_entries, sketched_places
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, column_norms, null_space, rank
+from planar.solving.checks import MIN_REGULARITY, ZERO_REGULARITY, column_norms, null_space, rank
 from planar.solving.newton import correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -19,11 +19,11 @@ from planar.foundation.time_limit import MORE_TIME, report_progress, stop_if_ove
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.assembly.nearest_assembly import Assembly
-from planar.solving.checks.singular_values import MIN_REGULARITY
+from planar.solving.checks import MIN_REGULARITY
 from planar.solving.continuation.fast_path import InputRates, resting_inputs, unjudged_rows
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.position import PositionSolver, solved_mechanism
-from planar.solving.runs.samples import build_motion
+from planar.solving.samples import build_motion
 
 MAX_STARTS = 16
 """Nodes next to the file's own position from which the grid may start."""

@@ -20,10 +20,13 @@ from planar.foundation.lazy_module import LazyModule
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, with_unit_rate
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
-from planar.solving.assembly.sketch_remarks import sketch_remarks
-from planar.solving.checks.residual_check import stack_motion
-from planar.solving.checks.singular_values import MIN_REGULARITY, null_space
+from planar.solving.assembly.nearest_assembly import (
+    Assembly,
+    AssemblySearchFailure,
+    find_nearest_assembly,
+    sketch_remarks,
+)
+from planar.solving.checks import MIN_REGULARITY, null_space, stack_motion
 from planar.solving.continuation.fast_path import (
     MIN_FAST_REGULARITY,
     BranchRates,
@@ -36,16 +39,15 @@ from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
-    from planar.solving import full_constraints
+    from planar.solving import full_constraints, samples
     from planar.solving.assembly import least_misfit
     from planar.solving.continuation.solution_curve import CurvePoint
     from planar.solving.diagnosis import refusals
-    from planar.solving.rates import sample_rates
 else:  # few positions need them
     least_misfit = LazyModule("planar.solving.assembly.least_misfit")
     full_constraints = LazyModule("planar.solving.full_constraints")
     refusals = LazyModule("planar.solving.diagnosis.refusals")
-    sample_rates = LazyModule("planar.solving.rates.sample_rates")
+    samples = LazyModule("planar.solving.samples")
 
 
 @takes_mechanism
@@ -257,11 +259,11 @@ class PositionSolver(PreparedMechanism):
 
     def _sample_rates(
         self, z: Array, branch_rates: Mapping[int, BranchRates]
-    ) -> tuple[list[Array], sample_rates.AccuracyDoubts | None]:
+    ) -> tuple[list[Array], samples.AccuracyDoubts | None]:
         """The rates at one sample."""
         u, u1, u2 = (rates[None] for rates in self.inputs[:3])
         inputs = InputRates(u, u1, u2, 0.0 * u)
-        return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
+        return samples.sample_rates(self, z[None], inputs, branch_rates, False)
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
         """The state of a position that is surely sound, of a mechanism that may have other inputs."""

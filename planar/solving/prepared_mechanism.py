@@ -35,8 +35,7 @@ from planar.model.mechanism import (
 )
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
-from planar.solving.checks.residual_check import ResidualCheck, residual_tolerance, stack_motion
-from planar.solving.checks.singular_values import column_norms
+from planar.solving.checks import ResidualCheck, column_norms, residual_tolerance, stack_motion
 
 if TYPE_CHECKING:
     from planar.solving.stops import MetStop, PairStops

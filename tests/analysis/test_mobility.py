@@ -11,7 +11,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.checks.singular_values import rank
+from planar.solving.checks import rank
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from tests.builders import four_bar_document

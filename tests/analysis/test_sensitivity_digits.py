@@ -9,7 +9,7 @@ import pytest
 import planar
 from planar.derivatives.design_equations import design_equations
 from planar.derivatives.kinematic_slopes import kinematic_results
-from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
+from planar.equations.casadi_functions import OPERATIONS, evaluate_function
 from tests.draws import covering
 from tests.known import MODELS
 

@@ -12,7 +12,7 @@ from planar.drawing.forces.torque import torque_picture
 from planar.dynamics.flywheel import explain_no_cycle
 from planar.dynamics.force_course import force_course
 from planar.reports.tables.forces.forces_over_motion import run_facts
-from planar.solving.runs.samples import ContinuousRun
+from planar.solving.samples import ContinuousRun
 
 
 def shaft(torque, places, factors, **others):

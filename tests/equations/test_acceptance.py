@@ -9,7 +9,7 @@ from planar.equations.block_types import block_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.model.pairs import pair_types
-from planar.solving.checks.residual_check import stack_motion
+from planar.solving.checks import stack_motion
 from planar.solving.position import solved_mechanism
 from tests.known import MODELS
 

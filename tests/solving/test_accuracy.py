@@ -12,7 +12,7 @@ from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Vector
 from planar.model.pairs.base import sample_shape
 from planar.model.pairs.guide_line import LinkLine
-from planar.solving.checks.residual_check import stack_motion
+from planar.solving.checks import stack_motion
 from planar.solving.continuation import path, predictor_corrector
 from planar.solving.continuation.path import Period
 from planar.solving.position import PositionSolver

@@ -5,11 +5,10 @@ import pytest
 
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving import position
+from planar.solving import position, samples
 from planar.solving.continuation.fast_path import is_move_allowed, resting_inputs
 from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
 from planar.solving.position import PositionSolver
-from planar.solving.rates import sample_rates
 from tests.acceptance import spoil_runs
 from tests.builders import four_bar_document
 from tests.checks import accept_steps
@@ -66,8 +65,8 @@ def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_bra
     inputs = circle(solver)
     first = follow_samples(solver, solver.find_assembly().z, resting_inputs(inputs)).z
     second = follow_samples(solver, mirrored(solver, first[0]), resting_inputs(inputs)).z
-    for samples in (first, second):
-        assert accept_steps(solver.acceptance, samples, inputs, solver.acceptance_scales).all()
+    for followed in (first, second):
+        assert accept_steps(solver.acceptance, followed, inputs, solver.acceptance_scales).all()
     crossed = np.where(np.arange(len(inputs))[:, None] % 2, first, second)
     assert not accept_steps(solver.acceptance, crossed, inputs, solver.acceptance_scales).any()
 
@@ -116,7 +115,7 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, by
 def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
     z = solver.find_assembly().z
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
-    real = sample_rates.solve_vectors
+    real = samples.solve_vectors
     for order in (1, 2):
         calls = []
 
@@ -124,7 +123,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
             calls.append(1)
             return real(slope, known) * (1.0 + (1e-7 if len(calls) == order else 0.0))
 
-        monkeypatch.setattr(sample_rates, "solve_vectors", wrong)
+        monkeypatch.setattr(samples, "solve_vectors", wrong)
         with pytest.raises(NoAnswer) as refused:
             solver.state(z)
         assert ("velocities" if order == 1 else "accelerations") in refused.value.reason

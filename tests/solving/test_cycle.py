@@ -9,9 +9,9 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.solving import samples
 from planar.solving.continuation import fast_path
 from planar.solving.position import PositionSolver
-from planar.solving.runs import samples as motion_rows
 from tests.builders import block_slider_crank, four_bar
 from tests.checks import accept_steps, passes_residual_check, same_angles
 from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, coupler, rates, rocker
@@ -563,14 +563,14 @@ def test_a_run_is_not_written_over_its_own_mechanism(tmp_path):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_row_whose_rates_break_a_constraint_has_none_and_is_named(monkeypatch, order):
-    real = motion_rows.sample_rates
+    real = samples.sample_rates
 
     def spoiled(*given):
         rated = real(*given)
         rated[0][order][3] *= 1.01
         return rated
 
-    monkeypatch.setattr(motion_rows, "sample_rates", spoiled)
+    monkeypatch.setattr(samples, "sample_rates", spoiled)
     motion = planar.cycle(four_bar(*ROCKER, 0.8), 12, jerk=True)
     assert np.flatnonzero(np.isnan(motion.link("BC").angular_velocity)).tolist() == [3]
     assert np.isfinite(motion.link("BC").angle).all()

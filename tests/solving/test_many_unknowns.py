@@ -11,11 +11,10 @@ import planar
 from benchmarks import chain
 from planar.equations import acceptance, functions
 from planar.equations.functions import equation_functions
-from planar.equations.sparse_matrices import SparseMatrices, SparsePattern
+from planar.equations.sparse_matrices import BorderedJacobian, SparseMatrices, SparsePattern, closing_step
 from planar.foundation.errors import NoAnswer
 from planar.foundation.private_cache import disable_cache
 from planar.solving import full_constraints, position, prepared_mechanism
-from planar.solving.continuation.bordered_jacobian import BorderedJacobian, closing_step
 from tests.builders import lift_document
 from tests.draws import first_cases
 from tests.known import MODELS

@@ -9,7 +9,7 @@ import pytest
 
 import planar
 from planar.equations import acceptance, block_type_functions, rates
-from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction
+from planar.equations.casadi_functions import CHUNK_SIZES, BufferedFunction
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
 from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position

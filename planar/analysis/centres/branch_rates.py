@@ -11,7 +11,7 @@ from planar.analysis.rate_equations import derivative
 from planar.foundation.arrays import Array
 from planar.foundation.jets import Jet
 from planar.results.motion import State
-from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
+from planar.solving.checks import SINGULAR_TOLERANCE, null_space
 from planar.solving.continuation.bifurcation import branch_directions
 
 

@@ -13,7 +13,7 @@ from planar.analysis.rate_ratios import choose_motion
 from planar.foundation.arrays import Array
 from planar.model.wording import REST_TOLERANCE
 from planar.results.motion import State
-from planar.solving.checks.singular_values import null_space
+from planar.solving.checks import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism

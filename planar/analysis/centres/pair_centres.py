@@ -11,7 +11,7 @@ from planar.foundation.geometry import Frame
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
-from planar.solving.checks.singular_values import null_space
+from planar.solving.checks import null_space
 
 RANK_TOLERANCE = 1e-10
 """A singular value below this part of the greatest is none: slopes are exact to rounding."""

@@ -12,7 +12,7 @@ from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Mechanism
 from planar.model.wording import count_phrase, join_all_names
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure
-from planar.solving.checks.singular_values import null_space, rank
+from planar.solving.checks import null_space, rank
 from planar.solving.full_constraints import (
     FullConstraints,
     find_closed_position,

@@ -25,7 +25,7 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
-from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
+from planar.solving.checks import SINGULAR_TOLERANCE
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -11,7 +11,7 @@ from planar.analysis.tolerance.cover import Undecided
 from planar.analysis.tolerance.varied import Varied
 from planar.derivatives.design_equations import DesignEquations, dead_points_over_boxes, fold_function
 from planar.derivatives.enclosures import ParameterBoxes, ParametricSystem
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.mechanism import relative_motions

@@ -24,7 +24,7 @@ from planar.assemblies.polynomial.krawczyk import (
     is_own_image,
     prove_box,
 )
-from planar.equations.generic_evaluation import evaluate_function
+from planar.equations.casadi_functions import evaluate_function
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
 
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.generic_evaluation import OPERATIONS, evaluate_function
+from planar.equations.casadi_functions import OPERATIONS, evaluate_function
 from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind

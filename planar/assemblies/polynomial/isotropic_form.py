@@ -28,8 +28,7 @@ import casadi as ca
 import numpy as np
 
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
-from planar.equations.casadi_call import BufferedFunction
-from planar.equations.generic_evaluation import is_piecewise_in
+from planar.equations.casadi_functions import BufferedFunction, is_piecewise_in
 from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, ComplexArray, IntArray

@@ -19,7 +19,7 @@ from planar.batch.march.design_batch import DesignBatch
 from planar.batch.march.kernel import KernelEquations, operand_rows
 from planar.batch.march.kernel_writer import OperandNames
 from planar.codegen.llvm_ir import write_cos_sin
-from planar.equations.generic_evaluation import FORMULA_OPERATIONS, inline_function
+from planar.equations.casadi_functions import FORMULA_OPERATIONS, inline_function
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.instruction_list import InstructionList, required_values
 

@@ -15,7 +15,7 @@ from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_arrays, solve_vectors
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, Scalar
-from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck, stack_motion
+from planar.solving.checks import EPS, NEGLIGIBLE_ERROR, ResidualCheck, stack_motion
 
 Array = np.ndarray
 

@@ -19,8 +19,8 @@ from planar.batch.march.stops import NUMBERS_PER_STOP, are_periodic, stop_rooms
 from planar.codegen.instructions import CosSin, InvariantHoister, check_length, expand_angle_sums
 from planar.codegen.llvm_ir import IRWriter
 from planar.codegen.llvm_linear import LinearSystems
+from planar.equations.casadi_functions import inline_function
 from planar.equations.closed_form import ClosedForm
-from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import block_jacobian, first_and_second_rates
 from planar.equations.residuals import input_positions, scalars
@@ -28,7 +28,7 @@ from planar.foundation.geometry import Vector
 from planar.foundation.instruction_list import InstructionList, required_values
 from planar.model.mechanism import links_counting_turns
 from planar.model.pairs import MeasureKind
-from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR
+from planar.solving.checks import EPS, NEGLIGIBLE_ERROR
 
 OperandNames = dict[Operand, str]
 """The names under which numbers stand in the text."""

@@ -22,8 +22,8 @@ from planar.batch.march.kernel_writer import (
 )
 from planar.batch.march.prediction import LEAST_COSINE, TABLE_COLUMNS
 from planar.codegen.tape import LANES, BlockFormula, BlockText, FormulaInput, LinkDirection
+from planar.equations.casadi_functions import inline_function
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.generic_evaluation import inline_function
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import block_jacobian, first_and_second_rates
 from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length

@@ -21,7 +21,7 @@ from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointName, PointPlacementError
 from planar.model.mechanism import Mechanism, relative_motions, running_input_index
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
+from planar.solving.checks import SHORT_ARM, residual_tolerance
 
 
 class SweepRequest(NamedTuple):

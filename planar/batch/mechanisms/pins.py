@@ -28,7 +28,7 @@ from planar.foundation.arrays import Array, BoolArray, IntArray, part_offsets
 from planar.model.link_shapes import PointName
 from planar.model.pin_linkages import PinnedLinkages
 from planar.solving.assembly.nearest_assembly import is_surely_farther
-from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
+from planar.solving.checks import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
 
 
 class PinStep(IntEnum):

@@ -38,7 +38,7 @@ from planar.derivatives.kinematic_slopes import (
 )
 from planar.derivatives.result_slopes import tied_dimensions
 from planar.document.dimensions import value_at
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.equations.residuals import input_positions, split_pair_numbers
 from planar.foundation.arrays import Array, BoolArray

@@ -26,7 +26,7 @@ from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import check_length
 from planar.codegen.llvm_compile import allocate_aligned, compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.equations.generic_evaluation import inline_function
+from planar.equations.casadi_functions import inline_function
 from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import Outcome
 from planar.foundation.instruction_list import InstructionList, UnsupportedOperation, required_values

@@ -19,7 +19,7 @@ from planar.foundation.instruction_list import UnsupportedOperation
 from planar.model.link_shapes import Distances, Link, LinkShape, PointMember
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input, Mechanism
 from planar.model.pairs import MeasureKind, Pair
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
+from planar.solving.checks import SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.dynamics.friction.contact_rows import side_words
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr

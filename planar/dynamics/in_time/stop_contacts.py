@@ -10,7 +10,7 @@ import numpy as np
 from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.in_time.complementarity import solve_complementarity
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
 from planar.solving.stops import STOP_TOLERANCE, MetStop, PairStops

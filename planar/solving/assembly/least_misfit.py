@@ -19,7 +19,7 @@ from planar.model.mechanism import Mechanism
 from planar.model.wording import amount
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
-from planar.solving.checks.singular_values import MIN_REGULARITY
+from planar.solving.checks import MIN_REGULARITY
 from planar.solving.newton import correct_position
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.sparse_matrices import SparseMatrices
+from planar.equations.sparse_matrices import BorderedJacobian, SparseMatrices, closing_step
 from planar.foundation.arrays import Array, ComplexArray, append_number, greatest_size, length_of, stack_row
-from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
-from planar.solving.continuation.bordered_jacobian import BorderedJacobian, closing_step
+from planar.solving.checks import SINGULAR_TOLERANCE
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle, shortest_step
 from planar.solving.prepared_mechanism import PreparedMechanism

@@ -32,8 +32,7 @@ from planar.equations.functions import MAX_CACHED_STRUCTURES
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.recorded_formula import formula_of_results, greatest_entries, number_of, recorded_arguments
-from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
+from planar.solving.checks import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR, SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:

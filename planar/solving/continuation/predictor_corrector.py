@@ -13,7 +13,7 @@ from planar.foundation.errors import NoAnswer, TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.foundation.time_limit import time_is_over
 from planar.model.pairs import MeasureKind
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
+from planar.solving.checks import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.bifurcation import (
     AT_BIFURCATION_DISTANCE,
     Bifurcation,

@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
-from planar.equations.sparse_matrices import SparseMatrices
+from planar.equations.sparse_matrices import BorderedJacobian, SparseMatrices
 from planar.foundation.arrays import Array, append_number, greatest_size, length_of, stack_row
 from planar.foundation.jets import Jet, value_and_rates
 from planar.model.pairs import Pair
-from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
-from planar.solving.continuation.bordered_jacobian import BorderedJacobian
+from planar.solving.checks import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.newton import SystemFunction, correct, correct_at_rank
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -21,7 +21,7 @@ from planar.model.mechanism import unjoined_points
 from planar.model.pairs import MeasureKind, joining_entry_text
 from planar.model.wording import amount, count_phrase, join_all_names, quote_names
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
-from planar.solving.checks.residual_check import CONTACT_TOLERANCE
+from planar.solving.checks import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 from planar.analysis.motion.transmission_angle import Transmission
 from planar.derivatives.design_equations import DesignEquations, OutputBalance, design_equations
 from planar.derivatives.transmission_system import output_angle
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.equations.elimination import stack_expressions
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import PlanarError

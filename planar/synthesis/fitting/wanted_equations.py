@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from planar.derivatives.design_equations import DesignEquations, design_equations
-from planar.equations.casadi_call import BufferedFunction
+from planar.equations.casadi_functions import BufferedFunction
 from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.model.mechanism import Mechanism
 from planar.synthesis.task.synthesis_task import SynthesisTask, Wanted, WantedFunction

@@ -12,7 +12,7 @@ import numpy as np
 from planar.codegen.complex_kernel import ComplexKernel
 from planar.codegen.formula_kernel import LANES
 from planar.codegen.printed_formula import PrintedFunction, compile_numpy
-from planar.equations.generic_evaluation import inline_function
+from planar.equations.casadi_functions import inline_function
 from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.instruction_list import InstructionList
 from planar.synthesis.exact.relations.elimination import EntryRows

@@ -1,1 +1,0 @@
-"""Is a position closed, and is it on the branch that it started on?"""
