@@ -17,7 +17,7 @@ from planar.batch.design_ends import (
     follow_to_dead_points,
     watch_stops,
 )
-from planar.batch.general_path import OUTCOMES, DesignRun
+from planar.batch.general_path import DesignRun
 from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.design_batch import DesignBatch, erase_between, erase_from_steps
 from planar.batch.march.runs import lead_designs, run_designs
@@ -130,11 +130,6 @@ class SolvedDesigns(NamedTuple):
     stop_position: Array
 
 
-def status_code(outcome: Outcome) -> int:
-    """What stands for an outcome in a status."""
-    return OUTCOMES.index(outcome)
-
-
 def input_motions(mechanism: Mechanism, block: DesignBlock, time: Array) -> Array:
     """Positions, first and second rates of the inputs (3, inputs, steps + 1, designs) of designs at times (steps + 1,)
     (SI)."""
@@ -191,10 +186,10 @@ class DesignBlockSolver:
             out[:] = np.nan
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
-        code[ended & (solved <= block.steps)] = status_code(Outcome.DEAD_POINT)
-        code[ended & (solved <= block.steps) & self.is_stopped] = status_code(Outcome.STOP)
+        code[ended & (solved <= block.steps)] = Outcome.DEAD_POINT.code
+        code[ended & (solved <= block.steps) & self.is_stopped] = Outcome.STOP.code
         failed = ~ended & (good == 0) & (self.failed_block >= 0)
-        code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
+        code[failed] = Outcome.CANNOT_BE_ASSEMBLED.code
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
         rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed).tolist()
@@ -271,7 +266,7 @@ class DesignBlockSolver:
             inputs[index] = solved.input
         self.general_positions += int(np.sum(solved.status == 0))
         self._count_sentence(int(solved.status[-1]), solved.message)
-        self._count_sentence(status_code(Outcome.SOLVED), solved.rate_remark)
+        self._count_sentence(Outcome.SOLVED.code, solved.rate_remark)
 
     def _count_sentence(self, code: int, sentence: str | NoAnswer) -> None:
         """Count a design with a sentence for a code; the sentence of the first design is kept."""

@@ -78,7 +78,7 @@ class DesignRun(NamedTuple):
         status, grid = np.zeros(self.steps + 1, dtype=np.int8), self.grid
 
         def without_motion(outcome: Outcome, message: str | NoAnswer) -> GridMotion:
-            status[:] = OUTCOMES.index(outcome)
+            status[:] = outcome.code
             return GridMotion(None, np.zeros(0), 0, status, message)
 
         reason = time_is_over()
@@ -98,7 +98,7 @@ class DesignRun(NamedTuple):
             distance = np.abs(position[:row_count] - grid[:row_count])
             is_off = distance > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
             row_count = int(np.argmax(is_off)) if is_off.any() else row_count
-        status[row_count:] = OUTCOMES.index(motion.outcome)
+        status[row_count:] = motion.outcome.code
         return GridMotion(motion, position, row_count, status, motion.reason if row_count <= self.steps else "")
 
     def solve(self, points: tuple[PointName, ...], rates: bool) -> SolvedDesign:

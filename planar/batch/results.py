@@ -16,6 +16,8 @@ from planar.model.wording import count_phrase
 
 Array = np.ndarray
 
+LACKING_RATES = "rates are missing or have few digits"
+
 
 class SweepNotes(NamedTuple):
     """What there is to say of a sweep of so many designs: how many designs the general path was given, and positions it
@@ -37,17 +39,13 @@ class SweepNotes(NamedTuple):
             told = f"{self.general_designs} of {many} designs went to the general path"
             found.append(f"{told}, which solved {self.general_positions} positions")
         found += [
-            f"{count} of {many} designs: {_describe_ending(outcomes[code])} (the first: {first})"
+            f"{count} of {many} designs: {outcomes[code] if code else LACKING_RATES} (the first: {first})"
             for code, count, first in self.endings
         ]
         if self.damaged_blocks:
             which = f"{self.damaged_blocks} of {count_phrase(self.block_count, 'block')} in the store"
             found.append(f"{which} {'was' if self.damaged_blocks == 1 else 'were'} not whole, and solved again")
         return tuple(found)
-
-
-def _describe_ending(outcome: Outcome) -> str:
-    return "rates are missing or have few digits" if outcome is Outcome.SOLVED else outcome.value
 
 
 def add_ending_counts(blocks: Iterable[Iterable[tuple[int, int, Any]]]) -> dict[int, tuple[int, Any]]:

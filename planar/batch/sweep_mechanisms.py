@@ -27,7 +27,7 @@ from planar.batch.reductions import (
     reduce_all,
     result_type,
 )
-from planar.batch.results import add_ending_counts
+from planar.batch.results import LACKING_RATES, add_ending_counts
 from planar.batch.sweep import warn_of_backend
 from planar.document.files import as_mechanism
 from planar.document.first_argument import MechanismSource
@@ -265,5 +265,5 @@ def _messages(results: Sequence[SweptPart | ReducedBlock], count: int, reason: s
     ]
     if without_rates:
         ended, first = without_rates
-        messages.append(f"{count_phrase(ended, 'mechanism')}: rates are missing or have few digits; {first}")
+        messages.append(f"{count_phrase(ended, 'mechanism')}: {LACKING_RATES}; {first}")
     return tuple(messages)

@@ -28,6 +28,11 @@ class Outcome(StrEnum):
     STRUCTURE = "structure"
     INTERRUPTED = "interrupted"
 
+    @property
+    def code(self) -> int:
+        """The number that stands for it in arrays of statuses."""
+        return [*Outcome].index(self)
+
 
 class TrackingEnd(StrEnum):
     """How a motion ends that cannot be followed further."""

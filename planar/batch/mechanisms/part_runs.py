@@ -17,12 +17,9 @@ from planar.batch.mechanisms.linkages import LinkageArrays, LinkArrays, SweepReq
 from planar.batch.mechanisms.pins import frame_pins, make_pin_tape, prepare_pins, result_pins
 from planar.batch.mechanisms.results import PointTable, SweptPart, between, dead_point_reason
 from planar.batch.mechanisms.tape_runs import (
-    DEAD_POINT_NUMBER,
     STEP_TABLE,
     Endings,
-    LinkageEnding,
     PreparedTape,
-    clear_points,
     make_block_kinds,
     make_tape,
     make_values,
@@ -63,23 +60,23 @@ def prepare_blocks(
     taped = make_tape(
         arrays, assemblies.block_numbers, temporary_slots, [STEP_TABLE] * len(arrays.batches), tape_points, rows
     ).select(np.flatnonzero(assemblies.is_sure))
-    find_endings = {
-        int(arrays.which[k]): partial(_find_ending, arrays, k, np.arange(*first_watched[k : k + 2]), pair)
+    find_stops = {
+        int(arrays.which[k]): partial(_find_stop, arrays, k, np.arange(*first_watched[k : k + 2]), pair)
         for k in np.flatnonzero(np.diff(first_watched)).tolist()
     }
     types = [batch.block_type for batch in arrays.batches]
-    return PreparedTape(taped, partial(make_block_kinds, types), find_endings)
+    return PreparedTape(taped, partial(make_block_kinds, types), find_stops)
 
 
 def note_dead_links(arrays: LinkageArrays, endings: Endings) -> None:
     """Note the reasons of linkages with blocks that come to a dead point."""
-    is_dead = (endings.solved >= 0) & (endings.outcome == DEAD_POINT_NUMBER)
+    is_dead = (endings.solved >= 0) & (endings.outcome == Outcome.DEAD_POINT.code)
     for number in arrays.which[is_dead[arrays.which]].tolist():
         links = arrays.links_of_block(int(endings.links[number, 0]))
         endings.reasons[number] = dead_point_reason(links, endings.start[number] + endings.near[number])
 
 
-def _find_ending(
+def _find_stop(
     arrays: LinkageArrays,
     k: int,
     rows: IntArray,
@@ -87,9 +84,8 @@ def _find_ending(
     rotation: Array,
     point_places: Callable[[IntArray], Array],
     good: int,
-) -> LinkageEnding | None:
-    """How a linkage ends whose pairs have stops, by two points of each watched link in `rows`; None if that is not
-    sure."""
+) -> tuple[int, str] | None:
+    """See `FindStop`: by two points of each watched link, in `rows` of the results."""
     mechanism, unit = arrays.mechanisms[k], float(arrays.unit[k])
     stops, counted = PairStops(mechanism, unit), links_counting_turns(mechanism)
     u = {given.pair: np.full((good, 1), given.position) for given in mechanism.inputs}
@@ -108,32 +104,30 @@ def _find_ending(
         return None
     values = np.array([frames.pair_value(pair.name)[0][:, 0] for pair in stops.pairs])
     ending = _find_first_stop(stops, values, np.array([angle[:, 0] for angle in frames.angles.values()]))
-    if ending is None or (ending.outcome is Outcome.SOLVED and good < len(positions)):
+    if ending is None or (not ending[1] and good < len(positions)):
         return None  # beside a dead point it is not clear which comes first
-    if ending.outcome is Outcome.SOLVED:
-        return ending
-    near = between(positions[[max(ending.solved_steps - 1, 0), ending.solved_steps]])
-    return ending._replace(reason=f"{ending.reason}, {near}")
+    solved, stop = ending
+    return solved, stop and f"{stop}, {between(positions[[max(solved - 1, 0), solved]])}"
 
 
-def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> LinkageEnding | None:
-    """The ending at the first stop, by the values of pairs with stops (stops, steps) and the angles of links (links,
-    steps); None if that is not clear."""
+def _find_first_stop(stops: PairStops, values: Array, angles: Array) -> tuple[int, str] | None:
+    """The number of steps before the first stop, and the stop in words, empty if there is none, by the values of pairs
+    with stops (stops, steps) and the angles of links (links, steps); None if that is not clear."""
     low, high, scale = (bound[:, None] for bound in (stops.low, stops.high, stops.scale))
     counted_values = values + stops.turns(values[:, 0])[:, None]
     distances = np.minimum(counted_values - low, high - counted_values) / scale
     nearest = distances.min(axis=0)
     if nearest[0] < -SURE_DISTANCE:
-        return LinkageEnding(0, Outcome.STOP, stops.describe_met(values[:, 0]))
+        return 0, stops.describe_met(values[:, 0])
     is_sure = stops.sure_rows(values, np.vstack([angles, values / scale]).T)
     if is_sure.all():
-        return LinkageEnding(len(is_sure))
+        return len(is_sure), ""
     first = int(np.argmin(is_sure))
     if first < 2 or nearest[first - 1] < SURE_DISTANCE or nearest[first] > -SURE_DISTANCE:
         return None
     k = int(np.argmin(distances[:, first]))
     is_upper = bool(values[k, first] > values[k, first - 1])
-    return LinkageEnding(first, Outcome.STOP, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units))
+    return first, stops.side(is_upper, k).describe(stops.motions, stops.mechanism.units)
 
 
 Mechanisms = Sequence[Mechanism] | PinnedLinkages
@@ -246,16 +240,17 @@ def _solve(mechanisms: Mechanisms, request: SweepRequest, values: Array | None, 
         note_dead_links(part.arrays, endings)
 
     undecided = np.flatnonzero(endings.solved < 0)
-    endings.solved[undecided], endings.outcome[undecided] = 0, DEAD_POINT_NUMBER
-    stopped = np.flatnonzero(endings.solved <= request.steps)
-    clear_points(values, points.first, stopped, endings.solved[stopped])
+    endings.solved[undecided], endings.outcome[undecided] = 0, Outcome.DEAD_POINT.code
+    first = points.first.tolist()
+    for k in np.flatnonzero(endings.solved <= request.steps).tolist():
+        values[first[k] : first[k + 1], :, endings.solved[k] :] = np.nan
     for k in undecided.tolist() if uses_general_path else ():
         names = points.names(k)
         solved = _solve_by_general_path(mechanisms[k], names, request)
         endings.solved[k], endings.outcome[k] = np.count_nonzero(solved.status == 0), solved.status[-1]
         endings.general_inputs[k] = solved.input
         endings.reasons[k] = str(solved.message or solved.rate_remark)
-        target = values[points.first[k] : points.first[k + 1], :, : request.steps + 1]
+        target = values[first[k] : first[k + 1], :, : request.steps + 1]
         by_order = solved.out.reshape(request.steps + 1, target.shape[1] // 2, len(names), 2)
         target[:] = by_order.transpose(2, 1, 3, 0).reshape(target.shape)
     return SweptPart(values[: points.first[-1]], request.steps, points, endings)

@@ -126,20 +126,10 @@ class Endings(NamedTuple):
         return cls(start, solved, outcome, links, near, {}, {})
 
 
-class LinkageEnding(NamedTuple):
-    """The number of solved steps, the outcome that ends them, and a sentence."""
-
-    solved_steps: int
-    outcome: Outcome = Outcome.SOLVED
-    reason: str = ""
-
-
-FindEnding = Callable[[Array, Callable[[IntArray], Array], int], LinkageEnding | None]
-"""Returns how a linkage with stops ends, by the rotations of its inputs (steps,), a function that returns x and y of
-result points (points, 2, steps), and the number of good steps; None if that is not sure."""
-
-OUTCOME_NUMBERS = {outcome: number for number, outcome in enumerate(Outcome)}
-DEAD_POINT_NUMBER = OUTCOME_NUMBERS[Outcome.DEAD_POINT]
+FindStop = Callable[[Array, Callable[[IntArray], Array], int], tuple[int, str] | None]
+"""Returns the number of solved steps of a linkage with stops, and the stop that ends it in words, empty if there is
+none; None if that is not sure. The arguments are the rotations of its inputs (steps,), a function that returns x and y
+of result points (points, 2, steps), and the number of good steps."""
 
 
 class PreparedTape(NamedTuple):
@@ -148,7 +138,7 @@ class PreparedTape(NamedTuple):
 
     taped: TapedLinkages
     make_kinds: Callable[[bool], BlockKinds]
-    find_endings: Mapping[int, FindEnding] = {}
+    find_stops: Mapping[int, FindStop] = {}
 
 
 def run_taped_linkages(
@@ -175,12 +165,6 @@ def make_values(points: int, steps: int, rates: bool, dtype: str = "float64") ->
     made = np.empty(size + LANES, dtype)
     first = -(made.ctypes.data // made.itemsize) % LANES
     return made[first : first + size].reshape(shape)
-
-
-def clear_points(values: Array, first: IntArray, which: IntArray, first_step: IntArray) -> None:
-    """Set the points of linkages, of linkage k from first[k] to first[k + 1], to NaN from a step of each on."""
-    for begin, end, step in zip(first[which].tolist(), first[which + 1].tolist(), first_step.tolist(), strict=True):
-        values[begin:end, :, step:] = np.nan
 
 
 def _chunks(taped: TapedLinkages, indices: IntArray, point_bytes: int, is_divided: bool) -> Iterator[IntArray]:
@@ -252,24 +236,23 @@ def _run_once(
     which, is_sure, is_dead = taped.which, outcome != UNDECIDED, outcome == DEAD_POINT
     endings.solved[which[is_sure]] = (good[is_sure] - 1) // finer + 1
     first_bad, dead = good[is_dead], which[is_dead]
-    endings.outcome[dead], endings.links[dead] = DEAD_POINT_NUMBER, taped.links[last_blocks[is_dead]]
+    endings.outcome[dead], endings.links[dead] = Outcome.DEAD_POINT.code, taped.links[last_blocks[is_dead]]
     endings.near[dead] = np.stack([rotation[first_bad - 1], rotation[first_bad]], axis=1)
 
     def point_places(result_rows: IntArray) -> Array:
         indices = np.searchsorted(rows, result_rows) if finer > 1 else result_rows
         return points[indices, :2, :count]
 
-    for k, number in enumerate(which.tolist()) if tape.find_endings else ():
-        if number not in tape.find_endings or not good[k]:
+    for k, number in enumerate(which.tolist()) if tape.find_stops else ():
+        if number not in tape.find_stops or not good[k]:
             continue
-        ending = tape.find_endings[number](rotation[:count], point_places, int(good[k]))
+        ending = tape.find_stops[number](rotation[:count], point_places, int(good[k]))
         if ending is None:
             endings.solved[number] = -1
             continue
-        endings.solved[number] = (ending.solved_steps - 1) // finer + 1
-        endings.outcome[number] = OUTCOME_NUMBERS[ending.outcome]
-        if ending.reason:
-            endings.reasons[number] = ending.reason
+        endings.solved[number] = (ending[0] - 1) // finer + 1
+        if ending[1]:
+            endings.outcome[number], endings.reasons[number] = Outcome.STOP.code, ending[1]
 
 
 RUNNING_INPUT, STANDING_INPUT, POINT, FIRST_BLOCK_TYPE = range(4)

@@ -37,7 +37,7 @@ RowValue = TypeVar("RowValue")
 BlockNote = tuple[int, int, Any]
 """Of a block the positions and designs of the general path, and by the code of each outcome how many designs ended so,
 and the sentence of the first."""
-INTERRUPTED = [*Outcome].index(Outcome.INTERRUPTED)
+INTERRUPTED = Outcome.INTERRUPTED.code
 """What stands for that in a status."""
 
 
