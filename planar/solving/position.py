@@ -39,7 +39,7 @@ from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism, lazy_frames
 
 if TYPE_CHECKING:
-    from planar.solving import full_constraints, samples
+    from planar.solving import full_constraints, sample_rates
     from planar.solving.assembly import least_misfit
     from planar.solving.continuation.solution_curve import CurvePoint
     from planar.solving.diagnosis import refusals
@@ -47,7 +47,7 @@ else:  # few positions need them
     least_misfit = LazyModule("planar.solving.assembly.least_misfit")
     full_constraints = LazyModule("planar.solving.full_constraints")
     refusals = LazyModule("planar.solving.diagnosis.refusals")
-    samples = LazyModule("planar.solving.samples")
+    sample_rates = LazyModule("planar.solving.sample_rates")
 
 
 @takes_mechanism
@@ -259,11 +259,11 @@ class PositionSolver(PreparedMechanism):
 
     def _sample_rates(
         self, z: Array, branch_rates: Mapping[int, BranchRates]
-    ) -> tuple[list[Array], samples.AccuracyDoubts | None]:
+    ) -> tuple[list[Array], sample_rates.AccuracyDoubts | None]:
         """The rates at one sample."""
         u, u1, u2 = (rates[None] for rates in self.inputs[:3])
         inputs = InputRates(u, u1, u2, 0.0 * u)
-        return samples.sample_rates(self, z[None], inputs, branch_rates, False)
+        return sample_rates.sample_rates(self, z[None], inputs, branch_rates, False)
 
     def fast_state(self, position: FastPosition, remarks: tuple[str, ...], mechanism: Mechanism) -> State:
         """The state of a position that is surely sound, of a mechanism that may have other inputs."""

@@ -5,7 +5,7 @@ import pytest
 
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving import position, samples
+from planar.solving import position, sample_rates
 from planar.solving.continuation.fast_path import is_move_allowed, resting_inputs
 from planar.solving.continuation.path import PathFollower, follow_samples, follow_to
 from planar.solving.position import PositionSolver
@@ -115,7 +115,7 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, by
 def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
     z = solver.find_assembly().z
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
-    real = samples.solve_vectors
+    real = sample_rates.solve_vectors
     for order in (1, 2):
         calls = []
 
@@ -123,7 +123,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
             calls.append(1)
             return real(slope, known) * (1.0 + (1e-7 if len(calls) == order else 0.0))
 
-        monkeypatch.setattr(samples, "solve_vectors", wrong)
+        monkeypatch.setattr(sample_rates, "solve_vectors", wrong)
         with pytest.raises(NoAnswer) as refused:
             solver.state(z)
         assert ("velocities" if order == 1 else "accelerations") in refused.value.reason
