@@ -13,6 +13,8 @@ SERIES_NODES, MAX_HALVINGS = 12, 4
 """Exact positions through which a quantity is laid to be differentiated; how often their stretch is halved for it."""
 SERIES_TOLERANCE = 1e-12
 """The last terms of a series, as a part of the greatest, when it has come to its end."""
+SECTION_TOLERANCE = 1e-10
+"""Of the stretch that is searched: how near a position that is found by sections is to the maximum."""
 REAL_ROOT_TOLERANCE = 1e-9
 """A root of a polynomial whose imaginary part is below this is real."""
 
@@ -47,7 +49,10 @@ def bracket_maxima(positions: Array, values: Array) -> Iterator[tuple[float, flo
 
 
 def find_maximum(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function is greatest between two positions: a zero of the derivative of a polynomial through it."""
+    """Where a function is greatest between two positions: a zero of the derivative of a polynomial through it.
+
+    Where no polynomial follows the function, as at a kink, the position is searched for by sections.
+    """
     lowest, highest = low, high
     at = 0.5 * (low + high)
     for _ in range(MAX_HALVINGS):
@@ -62,4 +67,11 @@ def find_maximum(function: Callable[[float], float], low: float, high: float) ->
             break
         quarter = 0.25 * (high - low)
         low, high = max(at - quarter, lowest), min(at + quarter, highest)
+    else:
+        from scipy.optimize import minimize_scalar  # slow to load, and only needed here
+
+        options = {"xatol": SECTION_TOLERANCE * (highest - lowest)}
+        section = minimize_scalar(lambda x: -function(float(x)), bounds=(low, high), method="bounded", options=options)
+        if -section.fun > function(at):
+            return float(section.x)
     return at
