@@ -10,6 +10,7 @@ from planar.foundation.errors import BadInput, Unknown
 from tests.builders import crank_rocker, open_four_bar, slider_crank
 from tests.closed_forms import turn_apart
 from tests.draws import part
+from tests.known import MODELS
 
 SEEDS = part(range(8), 2)
 
@@ -139,7 +140,7 @@ def test_it_is_none_where_the_input_is_at_a_limit():
         ("crank-rocker", "coupler", "no such link or pair"),
         ("crank-rocker", "B", "no such link or pair"),
         ("three-parallel-cranks", "crank C", "hold twice"),
-        ("planetary-gear-set", "arm", "wheels drive"),
+        ("gear-reducer", "output shaft", "wheels drive"),
         ("double-butterfly", "CGH", "G and H, not at one pin"),
         ("oldham", "disc 2", "couple"),
     ],
@@ -153,3 +154,45 @@ def test_where_no_one_line_of_force_drives_a_link_it_is_refused(name, output, wh
 def test_another_name_is_refused():
     with pytest.raises(Unknown, match="there is no pair and no link"):
         planar.transmission(planar.cycle(planar.load("crank-rocker"), 12), "nothing")
+
+
+def test_of_a_cam_with_a_translating_follower_it_is_the_complement_of_the_pressure_angle():
+    motion = planar.cycle(planar.load("tangent-cam"), 48)
+    found = planar.transmission(motion, "guide")
+    centre, cam = motion.point("P"), motion.inputs["O"]
+    # the follower's line passes through the centre of the cam
+    pressure = np.arctan2(np.abs(centre.velocity[:, 1] / cam.velocity), centre.position[:, 1])
+    assert pressure.max() > 0.2
+    assert found.angle == pytest.approx(0.5 * pi - pressure, abs=1e-9)
+
+
+def test_a_pin_between_two_meshes_of_wheels_drives_the_arm_squarely():
+    found = planar.transmission(planar.cycle(planar.load("planetary-gear-set"), 12), "arm")
+    assert found.through == ("P",)
+    assert found.angle == pytest.approx(0.5 * pi, abs=1e-9)
+
+
+OUTPUTS = [(stem, link.name) for stem, mechanism in MODELS.items() for link in mechanism.links if mechanism.inputs]
+
+
+@pytest.mark.parametrize(("stem", "output"), part(OUTPUTS, 8))
+def test_that_of_a_motion_is_that_of_a_sweep(stem, output):
+    mechanism, pair = MODELS[stem], MODELS[stem].inputs[0].pair
+    start = mechanism.inputs[0].position
+    try:
+        motion = planar.cycle(mechanism, 6, start, start + 0.05, pair)
+        angle = planar.transmission(motion, output).angle
+    except (BadInput, planar.NoAnswer) as refusal:
+        if isinstance(refusal, BadInput):
+            with pytest.raises(planar.PlanarError):
+                swept = planar.sweep(
+                    mechanism, {f"{pair}.position": start}, 6, outputs=output, start=start, stop=start + 0.05, pair=pair
+                )
+                # what constraints that hold twice leave open is not a number there
+                if np.isnan(swept.transmission_angle[output]).any():
+                    raise refusal from None
+        return
+    swept = planar.sweep(
+        mechanism, {f"{pair}.position": start}, 6, outputs=output, start=start, stop=start + 0.05, pair=pair
+    )
+    np.testing.assert_allclose(swept.transmission_angle[output][0], angle, atol=1e-7)

@@ -11,31 +11,24 @@ import numpy as np
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.design_frames import DesignFrames, pair_arguments, solve_own_coordinates
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
-from planar.derivatives.transmission_system import can_drive, force_point, loaded_output, output_angle, undriven_output
+from planar.derivatives.transmission_system import DrivenOutput
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.frictional_forces import solve_with_friction
 from planar.dynamics.load_variation import load_factors
 from planar.dynamics.reaction_solver import ReactionSolver
-from planar.dynamics.reactions import DETERMINED_TOLERANCE, input_efforts, pair_reaction
-from planar.dynamics.sharing.least_work import Wrench
+from planar.dynamics.reactions import input_efforts, pair_reaction
 from planar.dynamics.virtual_work import balance_equations
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.arrays import Array, BoolArray, IntArray
-from planar.foundation.errors import BadInput
-from planar.foundation.geometry import Frame, Vector
+from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.output_pair import find_output_pair
-from planar.model.pairs import MeasureKind
+from planar.model.mechanism import Mechanism
 from planar.model.pairs.base import Pair
-from planar.model.wording import join_all_names
 from planar.results.kinematic_result import KinematicResult
 
 MAX_CHUNK_POSITIONS = 4096
 """Positions whose forces are found at once."""
-NEGLIGIBLE_FORCE = 1e-7
-"""A force below this part of the greatest on the output, or a moment below this part at an arm of the size, is none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,77 +137,22 @@ def find_forces(
             arrays["reaction_couple", name][places] = reaction.couple
 
 
-class OutputLink:
-    """An output link, with the pairs by which other moving links may drive it. Raises Unknown, BadInput.
-
-    The rule is that of `planar.transmission`: inputs hold still, links are weightless, and the output alone is loaded.
-    """
-
-    def __init__(self, mechanism: Mechanism, output: str):
-        self.link, self.pair = find_output_pair(mechanism, output)
-        self.mechanism = loaded_output(mechanism, self.pair)
-        self.slides = self.pair.input_kind is MeasureKind.LENGTH
-        driven = self.link, self.pair
-        self.driving_pairs = {pair.name: pair for pair in mechanism.pairs if can_drive(mechanism, pair, driven)}
-        if not self.driving_pairs:
-            raise undriven_output(self.link)
-        motions = relative_motions(mechanism)
-        inputs = [motions[drive.pair] for drive in mechanism.inputs]
-        driving_inputs = [pair.name for pair in inputs if can_drive(mechanism, pair, driven)]
-        if driving_inputs:
-            reason = f"the input at {driving_inputs[0]} itself drives {self.link} from another moving link"
-            raise BadInput(self.link, f"{reason}; planar.transmission tells whether it has a transmission angle")
-
-    def angles(self, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray) -> Array:
-        """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
-        angles = np.full(frames.design_shape, np.nan)
-        variables = design_variables(self.mechanism)
-        # numbers of loads, springs and masses change nothing
-        kept = {name for name, variable in variables.items() if variable.path[0] != "loads"}
-        known = {name: value for name, value in values.items() if name in kept}
-        for positions in position_chunks(self.mechanism, frames, known, is_solved):
-            reactions = _reaction_solver(self.mechanism, frames, positions, known)
-            angles[positions.steps, positions.designs] = self._angles_at(reactions)
-        return angles
-
-    def _angles_at(self, reactions: ReactionSolver) -> Array:
-        """The angle at all positions (n,); 0 where nothing balances the load."""
-        solution, arm = reactions.solve(), reactions.arm
-        wrenches = {name: solution.wrenches[name][self.link] for name in self.driving_pairs}
-        unit = 1.0 if self.slides else 1.0 / arm  # of a force that balances the load
-        names = []
-        for name, wrench in wrenches.items():
-            size = np.maximum(np.hypot(*wrench.force.T), np.abs(wrench.moment) / arm)
-            if np.any(size[solution.is_balanced] > NEGLIGIBLE_FORCE * unit):
-                names.append(name)
-        if not names and solution.is_balanced.any():
-            raise undriven_output(self.link)
-        names = names or [*wrenches]
-        force, moment = (np.sum([wrenches[name][k] for name in names], axis=0) for k in range(2))
-        changes = [solution.wrench_changes[name][self.link].force for name in names]
-        change = np.max([np.abs(each).max(axis=(1, 2), initial=0.0) for each in changes], axis=0)
-        force = np.where((change <= DETERMINED_TOLERANCE)[:, None], force, np.nan)
-        if not self.slides:
-            self._check_line(reactions.field, names, Wrench(force, moment))
-        angle = output_angle(reactions.field, (self.link, self.pair), (*names,), [Vector(*force.T)])
-        return np.where(solution.is_balanced, angle, 0.0)
-
-    def _check_line(self, field: KinematicArrays, names: list[str], driving: Wrench) -> None:
-        """Refuse what drives a turning output by more than a force at one point. Raises BadInput."""
-        places = {force_point(self.driving_pairs[name], self.link) for name in names}
-        place = places.pop()
-        if places or place is None:
-            reason = f"{self.link} is driven at several places, or by wheels"
-            raise BadInput(self.link, f"{reason}, so that no one line of force with one pin tells a transmission angle")
-        link, point = place
-        couple = np.abs(driving.moment_about(field.point_rates(link, field.shapes[link].position(point))))
-        # beside the torque of one that it balances
-        if np.max(couple[np.isfinite(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
-            reason = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
-            raise BadInput(self.link, f"{reason}, so that no line of force through one pin tells a transmission angle")
+def transmission_angles(
+    driven: DrivenOutput, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray
+) -> Array:
+    """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
+    angles = np.full(frames.design_shape, np.nan)
+    variables = design_variables(driven.mechanism)
+    # numbers of loads, springs and masses change nothing
+    kept = {name for name, variable in variables.items() if variable.path[0] != "loads"}
+    known = {name: value for name, value in values.items() if name in kept}
+    for positions in position_chunks(driven.mechanism, frames, known, is_solved):
+        reactions = _reaction_solver(driven.mechanism, frames, positions, known)
+        angles[positions.steps, positions.designs] = driven.angles(reactions)[1]
+    return angles
 
 
 @lru_cache(maxsize=16)
-def output_link(mechanism: Mechanism, output: str) -> OutputLink:
+def output_link(mechanism: Mechanism, output: str) -> DrivenOutput:
     """An output link, kept. Raises Unknown, BadInput."""
-    return OutputLink(mechanism, output)
+    return DrivenOutput(mechanism, output)
