@@ -49,9 +49,9 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     the perpendicular to its way. At 90 degrees all of F does work, at 0 nothing does: there the input is at a limit.
     In a four-bar it is the angle between coupler and follower, in a slider-crank the rod's with the perpendicular.
 
-    F balances the load with the forces in all pairs, those of wheels and cams along the normals of their contacts. Where
-    it is not determined but its direction is, that direction counts. The least over a motion is solved for:
-    where the derivative of a polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
+    F balances the load with the forces in all pairs, those of wheels and cams along the normals of their contacts; where
+    only its direction is determined, that counts. The least over a motion is solved for: where the derivative of a
+    polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
 
     Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input
     itself drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a
