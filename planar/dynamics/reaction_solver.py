@@ -281,23 +281,24 @@ class ReactionSolver:
             actions[link] = (self.equilibrium_matrix[:, own, rows] @ forces) / self.coordinate_scale[None, own, None]
         return self._wrenches_on_bodies(pair, actions)
 
+    def input_wrench(self, link: str, number: int, solution: ForceSolution) -> tuple[Wrench, Wrench]:
+        """What the effort of an input does to a link that moves (n,), and how it may be otherwise (n, ways)."""
+        first = self.work.link_columns[link]
+        direction = self.balance.input_directions[:, number, first : first + 3, None]
+        wrench = self._wrench_on_link(link, direction * solution.efforts[:, None, number : number + 1])
+        changes = self._wrench_on_link(link, direction * solution.effort_changes[:, number, None])
+        return Wrench(wrench.force[:, 0], wrench.moment[:, 0]), changes
+
     def _wrenches_on_bodies(self, pair: Pair, actions: LinkActions) -> dict[str, Wrench]:
         """Forces on the coordinates of a pair's bodies (n, 3, ways) by link; the frame has what adds up to nothing."""
-        found = {link: self.wrench_on_link(link, action) for link, action in actions.items()}
+        found = {link: self._wrench_on_link(link, action) for link, action in actions.items()}
         none = np.zeros(())
         rest = Wrench(
             -sum((each.force for each in found.values()), none), -sum((each.moment for each in found.values()), none)
         )
         return {link: found.get(link, rest) for link in pair.bodies}
 
-    def input_wrench(self, index: int, link: str, efforts: Array) -> Wrench:
-        """What an input does to a moving link (n, ways) by its efforts (n, ways)."""
-        first = self.work.link_columns[link]
-        direction = self.balance.input_directions[:, index, first : first + 3]
-        return self.wrench_on_link(link, direction[:, :, None] * efforts[:, None])
-
-    def wrench_on_link(self, link: str, action: Array) -> Wrench:
-        """Actions on the coordinates of a link (n, 3, ways) as forces with their moments."""
+    def _wrench_on_link(self, link: str, action: Array) -> Wrench:
         frame = self.frames[link]
         force = action[:, :2].transpose(0, 2, 1)
         return Wrench(force, action[:, 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])

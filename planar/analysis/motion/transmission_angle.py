@@ -10,15 +10,13 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
-from planar.derivatives.transmission_system import OutputLink
+from planar.derivatives.transmission_system import DrivenOutput
 from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.reaction_solver import fill_balance
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.short_repr import short_repr
-from planar.model.mechanism import Mechanism
-from planar.model.output_pair import find_output_pair
 from planar.results.motion import Motion, State
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -51,9 +49,9 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     the perpendicular to its way. At 90 degrees all of F does work, at 0 nothing does: there the input is at a limit.
     In a four-bar it is the angle between coupler and follower, in a slider-crank the rod's with the perpendicular.
 
-    F is the force between links that `planar.forces` and sweeps compute: of a cam along its contact normal, so that a
-    sliding follower has 90 degrees less the pressure angle. The least over a motion is solved for:
-    where the derivative of a polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
+    F balances the load with the forces in all pairs, those of wheels and cams along the normals of their contacts;
+    where only its direction is determined, that counts. The least over a motion is solved for: where the derivative of
+    a polynomial through exact values of cos^2 is zero, or, at a kink, by sections; good to about 1e-8 of the input.
 
     Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input
     itself drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a
@@ -64,19 +62,38 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     >>> round(planar.transmission(state, "D").angle, 3)
     1.57
     """
-    angles = _OutputAngles(moving.mechanism, output)
-    through, angle = angles.at(moving)
-    least = _find_least(moving, angles, through, angle) if isinstance(moving, Motion) else None
-    link, pair = angles.output.link, angles.output.pair.name
-    return Transmission(link, pair, through, float(angle[0]) if least is None else angle, least)
+    mechanism = moving.mechanism
+    driven = DrivenOutput(mechanism, output)
+    if not mechanism.inputs:
+        raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
+    PreparedMechanism(mechanism).refuse_misfit("a transmission angle is not told")
+    through, angle = _angles(driven, moving)
+    least = _find_least(moving, driven, through, angle) if isinstance(moving, Motion) else None
+    return Transmission(driven.link, driven.pair.name, through, float(angle[0]) if least is None else angle, least)
 
 
-def _find_least(motion: Motion, angles: _OutputAngles, through: tuple[str, ...], angle: Array) -> Extreme:
+def _angles(
+    driven: DrivenOutput, moving: State | Motion, through: tuple[str, ...] = ()
+) -> tuple[tuple[str, ...], Array]:
+    """The pairs that drive the output, and the angle (n,). Raises BadInput where constraints hold twice."""
+    reactions = fill_balance(KinematicArrays(replace(moving, mechanism=driven.mechanism), at_rest=True), None, False)
+    through, angle = driven.angles(reactions, through)
+    unknown = np.flatnonzero(np.isnan(angle))
+    if unknown.size:
+        _, link_count, force_count = reactions.equilibrium_matrix.shape
+        is_way = (reactions.equilibrium.null_space[unknown] != 0.0).any(axis=1)
+        if (force_count - is_way.sum(axis=1) == link_count).any():
+            told = f"constraints hold twice, so that the forces on {driven.link} are not determined without elasticity"
+            raise BadInput(driven.link, f"{told}; leave out the link that holds nothing new")
+    return through, angle
+
+
+def _find_least(motion: Motion, driven: DrivenOutput, through: tuple[str, ...], angle: Array) -> Extreme:
     """Where over a motion the angle is least, and how great it is."""
     steady = InterpolatedRun(motion)
 
     def exact(position: float) -> float:
-        return float(angles.at(steady.state_at(position), through)[1][0])
+        return float(_angles(driven, steady.state_at(position), through)[1][0])
 
     order = np.argsort(steady.positions, kind="stable")
     positions, angle = steady.positions[order], angle[order]
@@ -102,28 +119,3 @@ def _find_least(motion: Motion, angles: _OutputAngles, through: tuple[str, ...],
     least = min(each.value for each in found)
     first = min(each for each in found if each.value <= least + SERIES_TOLERANCE)
     return first if least <= sampled.value + SERIES_TOLERANCE else sampled
-
-
-class _OutputAngles:
-    """The transmission angles of an output link at positions of one mechanism."""
-
-    def __init__(self, mechanism: Mechanism, output: str):
-        find_output_pair(mechanism, output)
-        if not mechanism.inputs:
-            raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
-        PreparedMechanism(mechanism).refuse_misfit("a transmission angle is not told")
-        self.output = OutputLink(mechanism, output)
-
-    def at(self, moving: State | Motion, through: tuple[str, ...] = ()) -> tuple[tuple[str, ...], Array]:
-        """The pairs that drive the output, if they are not given, and the angle (n,); 0 at a limit."""
-        loaded = replace(moving, mechanism=self.output.mechanism)
-        reactions = fill_balance(KinematicArrays(loaded, at_rest=True), None, inertia=False)
-        names, angles = self.output.angles(reactions, through)
-        null_space = reactions.equilibrium.null_space
-        surplus = null_space.shape[1] - reactions.work.link_coordinate_count
-        is_regular = np.any(null_space != 0.0, axis=1).sum(axis=1) == surplus
-        if surplus > 0 and (np.isnan(angles) & is_regular).any():
-            link = self.output.link
-            reason = f"constraints hold twice, so that the forces on {link} are not determined without elasticity"
-            raise BadInput(link, f"{reason}; leave out the link that holds nothing new")
-        return names, angles

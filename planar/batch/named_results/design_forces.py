@@ -11,7 +11,7 @@ import numpy as np
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.design_frames import DesignFrames, pair_arguments, solve_own_coordinates
 from planar.batch.named_results.result_rows import NamedArrays, RequestedResults
-from planar.derivatives.transmission_system import OutputLink
+from planar.derivatives.transmission_system import DrivenOutput
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.friction.frictional_forces import solve_with_friction
 from planar.dynamics.load_variation import load_factors
@@ -137,22 +137,22 @@ def find_forces(
             arrays["reaction_couple", name][places] = reaction.couple
 
 
-def find_transmission_angles(
-    output: OutputLink, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray
+def transmission_angles(
+    driven: DrivenOutput, frames: DesignFrames, values: Mapping[str, Array], is_solved: BoolArray
 ) -> Array:
     """The angle (rad, 0 to pi/2) of designs at every step (steps + 1, designs); NaN where it is not determined."""
     angles = np.full(frames.design_shape, np.nan)
-    variables = design_variables(output.mechanism)
+    variables = design_variables(driven.mechanism)
     # numbers of loads, springs and masses change nothing
-    geometry = {name for name, variable in variables.items() if variable.path[0] != "loads"}
-    known = {name: value for name, value in values.items() if name in geometry}
-    for positions in position_chunks(output.mechanism, frames, known, is_solved):
-        reactions = _reaction_solver(output.mechanism, frames, positions, known)
-        angles[positions.steps, positions.designs] = output.angles(reactions)[1]
+    kept = {name for name, variable in variables.items() if variable.path[0] != "loads"}
+    known = {name: value for name, value in values.items() if name in kept}
+    for positions in position_chunks(driven.mechanism, frames, known, is_solved):
+        reactions = _reaction_solver(driven.mechanism, frames, positions, known)
+        angles[positions.steps, positions.designs] = driven.angles(reactions)[1]
     return angles
 
 
 @lru_cache(maxsize=16)
-def output_link(mechanism: Mechanism, output: str) -> OutputLink:
-    """An output link, cached. Raises Unknown, BadInput."""
-    return OutputLink(mechanism, output)
+def output_link(mechanism: Mechanism, output: str) -> DrivenOutput:
+    """An output link, kept. Raises Unknown, BadInput."""
+    return DrivenOutput(mechanism, output)

@@ -12,7 +12,7 @@ from planar.batch.design_arrays import split_into_blocks, with_design_values
 from planar.batch.design_frames import DesignFrames
 from planar.batch.general_path import link_angles
 from planar.batch.march.prediction import LONGEST_STEP
-from planar.batch.named_results.design_forces import find_forces, find_transmission_angles, output_link
+from planar.batch.named_results.design_forces import find_forces, output_link, transmission_angles
 from planar.batch.named_results.design_slopes import design_slopes
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, NamedArrays, RequestedResults
 from planar.codegen.llvm_compile import allocate_aligned
@@ -199,9 +199,8 @@ class _ResultBlockSolver:
         if self.results.has_forces:
             find_forces(self.mechanism, self.results, frames, values, is_solved, arrays)
         for name in self.results.outputs:
-            arrays["transmission_angle", name][0] = find_transmission_angles(
-                output_link(self.mechanism, name), frames, values, is_solved
-            )
+            driven = output_link(self.mechanism, name)
+            arrays["transmission_angle", name][0] = transmission_angles(driven, frames, values, is_solved)
         if self.slopes is not None and not self.marches_slopes:
             is_asked = np.zeros_like(is_solved)  # not between the positions of the sweep
             is_asked[::refined] = is_solved[::refined]
