@@ -456,10 +456,9 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_names(case):
-    value, expected = CASES[case]
-    assert mechanism_names(planar.from_dict(value)) == expected
+def test_names():
+    for case, (value, expected) in CASES.items():
+        assert mechanism_names(planar.from_dict(value)) == expected, case
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -484,12 +484,13 @@ def test_numbers_of_numpy_read_and_write_as_plain_numbers_do() -> None:
 # bad input, place by place
 
 
-@pytest.mark.parametrize(("of", "path", "new", "place", "words"), MISTAKES)
-def test_a_mistake_is_refused_at_its_place(of: str, path: list[Any], new: Any, place: str, words: tuple[str]) -> None:
-    problem = refused(mistaken(of, path, new))
-    assert problem.place == place
-    for word in words:
-        assert word in problem.sentence
+def test_mistakes_are_refused_at_their_places() -> None:
+    for case in MISTAKES:
+        name, path, new, place, words = case.values
+        problem = refused(mistaken(name, path, new))
+        assert problem.place == place, case.id
+        for word in words:
+            assert word in problem.sentence, case.id
 
 
 def test_a_remedy_is_of_the_kind_that_is_wanted() -> None:

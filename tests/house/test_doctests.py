@@ -26,14 +26,14 @@ def computed_once():
         yield
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_a_function_has_an_example_among_those_of_its_module(name):
+def test_functions_have_examples_among_those_of_their_modules():
     """Those of modules are run by the tests of the public face."""
-    value = inspect.unwrap(getattr(planar, name))
-    module = import_module(value.__module__)
-    assert ">>> " in Path(inspect.getsourcefile(module)).read_text(encoding="utf-8")
-    found = doctest.DocTestFinder(exclude_empty=True).find(module)
-    assert [each for each in found if each.examples and each.docstring == value.__doc__]
+    for name in FUNCTIONS:
+        function = inspect.unwrap(getattr(planar, name))
+        module = import_module(function.__module__)
+        assert ">>> " in Path(inspect.getsourcefile(module)).read_text(encoding="utf-8"), name
+        examples = doctest.DocTestFinder(exclude_empty=True).find(module)
+        assert [case for case in examples if case.examples and case.docstring == function.__doc__], name
 
 
 def test_every_public_class_has_an_example_in_the_reference():

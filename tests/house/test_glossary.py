@@ -4,8 +4,6 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
-
 from planar.foundation.errors import Outcome
 from planar.guide.topics import read_page
 from planar.model.mechanism import PUBLISHED_QUANTITIES
@@ -55,9 +53,11 @@ EXPLAINED = {
 }
 
 
-@pytest.mark.parametrize("heading", sorted(headings() | {each.value for each in Outcome} | set(PUBLISHED_QUANTITIES)))
-def test_every_word_of_a_heading_is_in_the_glossary(heading):
-    assert words_of(heading) - {singular(each) for each in EVERYDAY.split()} <= EXPLAINED
+def test_every_word_of_a_heading_is_in_the_glossary():
+    explained = EXPLAINED | {singular(word) for word in EVERYDAY.split()}
+    texts = headings() | {outcome.value for outcome in Outcome} | set(PUBLISHED_QUANTITIES)
+    assert len(texts) > 200
+    assert {text: missing for text in texts if (missing := words_of(text) - explained)} == {}
 
 
 def test_the_glossary_goes_by_the_alphabet_and_leads_from_other_words_to_its_own():

@@ -27,8 +27,8 @@ CUT_SQUARE = [[-1, -2], [3, -2], [3, 3], [1, 0.5], [-1, 3]]
 def few_designs(monkeypatch):
     """A small catalogue, which is enough for tasks as easy as these."""
     set_small_searches(monkeypatch)
-    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1000)
-    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 10)
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 600)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 5)
 
 
 def task(start, *wanted, **more):
@@ -210,7 +210,9 @@ def test_between_entries_a_transmission_angle_is_kept_where_the_input_swings(few
         ]
     ),
 )
-def test_a_region_is_kept_by_all_points(few_designs, corners):
+def test_a_region_is_kept_by_all_points(few_designs, monkeypatch, corners):
+    monkeypatch.setattr("planar.synthesis.synthesise.DRAWS", 1000)
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 10)  # fewer do not come near the path in this region
     wanted = {"point": "E", "through": [[0, 0], [20, 12], [42, 15], [63, 8], [80, -6]], "in_order": True}
     turning = task("four-bar", wanted, demands=["whole turn"])
     given = planar.read_task(task("four-bar", wanted, demands=[{"inside": corners}])).demands.inside

@@ -16,7 +16,15 @@ import planar
 from planar.synthesis.judgement.judgement import DesignJudge
 from tests.command import ROOT, run
 
-SETTINGS = {"DRAWS": 100, "MATCHES": 4, "ROUNDS": 2, "GOOD": 0.0, "SETTLED": 99}
+SETTINGS = {
+    "synthesise.DRAWS": 100,
+    "synthesise.MATCHES": 4,
+    "synthesise.ROUNDS": 2,
+    "synthesise.GOOD": 0.0,
+    "synthesise.SETTLED": 99,
+    "fitting.design_fit.MAX_STEPS": 30,
+}
+"""Numbers of modules in `planar.synthesis`, for searches of few designs whose fits end before they converge."""
 TASK = {
     "planar": 1,
     "name": "Lid",
@@ -31,7 +39,7 @@ def set_small_search(patch):
     """Few designs; and no machine code, which rounds otherwise than numpy, so that numbers are the same to the bit."""
     patch.setattr("planar.codegen.printed_formula.MAX_COMPILED_INSTRUCTIONS", 0)
     for name, value in SETTINGS.items():
-        patch.setattr(f"planar.synthesis.synthesise.{name}", value)
+        patch.setattr(f"planar.synthesis.{name}", value)
 
 
 @pytest.fixture(autouse=True)
@@ -120,6 +128,7 @@ def test_what_was_stopped_goes_on_to_the_same_designs(whole, tmp_path, monkeypat
 
 def test_what_is_in_the_way_is_told_alike_after_an_interrupt(tmp_path, monkeypatch):
     task = TASK | {"start": "slider-crank", "demands": [{"inside": [[-1, -1], [1, 1]]}]}
+    monkeypatch.setattr("planar.synthesis.synthesise.MATCHES", 2)  # each design is judged all round its region
     with monkeypatch.context() as patch:
         stop_at(patch, None, judged := [])
         whole = planar.synthesise(task, many=1)
@@ -135,9 +144,11 @@ def test_a_process_that_is_killed_leaves_nothing_broken(whole, tmp_path):
     found, folder, _ = whole
     copied(folder, tmp_path / "designs", leave_out=("00002-2.json",))
     killed = (
-        "import json, os, signal, sys; import planar; import planar.synthesis.synthesise as search\n"
+        "import json, os, signal, sys; from importlib import import_module; import planar\n"
         "from planar.synthesis.judgement.judgement import DesignJudge\n"
-        f"for name, value in {SETTINGS!r}.items(): setattr(search, name, value)\n"
+        f"for name, value in {SETTINGS!r}.items():\n"
+        "    module, _, constant = name.rpartition('.')\n"
+        "    setattr(import_module(f'planar.synthesis.{module}'), constant, value)\n"
         "judge, left = DesignJudge.judge, [1]\n"
         "def die(self, *given):\n"
         "    left[0] -= 1\n"

@@ -185,16 +185,17 @@ def same(one, other):
     return all(alike(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
 
 
-@pytest.mark.parametrize(("of", "path", "new", "place", "words"), MISTAKES)
-def test_a_mistake_is_refused_at_its_place_and_by_the_schema_where_that_can(of, path, new, place, words):
-    value = mistaken(of, path, new)
-    problem = refusal(value)
-    assert problem is not None
-    assert problem.place == place
-    for word in words:
-        assert word in problem.sentence
-    if wrong(value) is None:
-        assert any(each in problem.sentence for each in UNSAID), problem.sentence
+def test_mistakes_are_refused_at_their_places_and_by_the_schema_where_that_can():
+    for case in MISTAKES:
+        name, path, new, place, words = case.values
+        value = mistaken(name, path, new)
+        problem = refusal(value)
+        assert problem is not None, case.id
+        assert problem.place == place, case.id
+        for word in words:
+            assert word in problem.sentence, case.id
+        if wrong(value) is None:
+            assert any(unsaid in problem.sentence for unsaid in UNSAID), f"{case.id}: {problem.sentence}"
 
 
 @pytest.mark.parametrize("name", BASES)
