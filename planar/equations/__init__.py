@@ -24,6 +24,7 @@ equations are the same. Both are instruction lists, printed as Python for floats
 kept with the package. Functions of a whole structure are derived only where its equations as a whole are evaluated
 several times.
 
+casadi_functions      casadi functions on arrays, and carried out on numbers of another kind
 coordinates           what stands in w, and the frames of links that it makes
 mechanism_numbers     structure, size and numbers p of a mechanism
 residuals             the residuals of all pairs and inputs, for every arithmetic
@@ -36,8 +37,8 @@ block_types           blocks by their own equations, placed by indices
 block_type_functions  residuals, coordinates, closed form, motion and runs of a block type
 block_motion          the coordinates of a block type with their rates, and how regular it is
 closed_form           both assemblies of a block of two unknowns, derived from its equations
-placed_blocks         the functions of blocks, called with z, u and p of the whole
 rates                 time derivatives of expressions in y, and of the unknowns
+sparse_matrices       sparse Jacobians, their factors, and bordered ones along a curve
 functions             F, w, rates and Jacobians by elements, or as compiled functions of the whole, kept on disk
 constraint_check      every constraint with its rates by its pair's own formula, pairs of equal formula together
 acceptance            positions and runs computed block after block, and all that they have to pass

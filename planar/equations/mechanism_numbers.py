@@ -52,12 +52,6 @@ def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: fl
     return np.array([number for pair in mechanism.pairs for number in scaled_pair_numbers(pair, shapes, unit)], float)
 
 
-def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
-    """p from the numbers of every pair, lengths divided by `unit`."""
-    scaled = (scale_lengths(numbers[pair.name], pair.number_kinds, unit) for pair in mechanism.pairs)
-    return np.array([number for part in scaled for number in part], dtype=float)
-
-
 def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: Scalar) -> list[Scalar]:
     """The numbers of one pair, lengths divided by `unit`."""
     return scale_lengths(pair.measure([shapes[link] for link in pair.bodies]), pair.number_kinds, unit)
