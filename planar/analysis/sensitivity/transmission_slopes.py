@@ -30,7 +30,8 @@ class TransmissionSlopes(NamedTuple):
 
     `angle` and each of `slopes` are numbers, over a motion arrays (n,); `least` is the least over a motion, and
     `least_slopes` its derivatives, where the input follows it: None of a position, and at an end of an open range.
-    There is no derivative (NaN) at an angle of 0 or 90 degrees, where it is told as turning round.
+    There is no derivative (NaN) at an angle of 0 or 90 degrees, from which it is reported as falling to both sides, and
+    where an input between moving links drives the output.
     """
 
     link: str
@@ -71,7 +72,9 @@ def _angle_slopes(moving: State | Motion, of: Transmission, pair: Pair, angle: A
         return [NamedResult("angle", "angle", (derived_angle,))]
 
     slopes = system.derive(output_result).slopes["angle"][:, 0]
-    is_known = (np.abs(angle - 0.5 * np.pi) > FOLD) & (angle > FOLD)
+    # the balance does not derive the effort of an input between moving links, by which it may drive the output
+    is_by_input = any(driven.pair in of.through for driven in moving.mechanism.inputs)
+    is_known = (np.abs(angle - 0.5 * np.pi) > FOLD) & (angle > FOLD) & (not is_by_input)
     slopes = np.where(is_known[:, None], slopes, np.nan)
     sections = {dimension.name: dimension.path[0] for dimension in system.parameters.dimensions}
     return {
