@@ -175,6 +175,8 @@ class DesignBlockSolver:
         length = FULL_TURN if block.stop is None else block.stop - self.start
         self.range_length: Array = np.broadcast_to(length, self.start.shape)
         self.has_common_length = bool(np.ptp(self.range_length) == 0.0)
+        self.has_common_range = self.has_common_length and not self.has_own_range
+        "whether one range serves all designs"
         self.march: DesignBatch | None = None
 
     def solve(self) -> SolvedDesigns:
@@ -221,10 +223,9 @@ class DesignBlockSolver:
             return False
         if block.duration is not None:
             return not reference.mechanism.stops
-        has_common_range = self.has_common_length and not self.has_own_range
         # farther the general path counts turns
         is_counted = np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
-        return bool(is_counted and (block.start is None or has_common_range))
+        return bool(is_counted and (block.start is None or self.has_common_range))
 
     def _input_positions(self) -> Array:
         """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges. The
@@ -243,8 +244,12 @@ class DesignBlockSolver:
         """Solve designs as `sweep_each` does, whose functions are compiled for types of blocks; the designs that are
         left: those that it does not decide, or that do not come to the end."""
         block = self.block
-        has_common_range = self.has_common_length and not self.has_own_range
-        if block.duration is not None or block.start is not None or self.reference.is_sliding or not has_common_range:
+        if (
+            block.duration is not None
+            or block.start is not None
+            or self.reference.is_sliding
+            or not self.has_common_range
+        ):
             return designs
         request = SweepRequest(block.steps, block.points, block.rates, block.pair, float(self.range_length[0]))
         left: list[int] = []
@@ -333,7 +338,7 @@ class DesignBlockSolver:
             self.solved_steps[outside], self.is_stopped[outside] = 0, True
             fit &= is_inside & ~outside
             march = march._replace(stops=limits)
-        if self.has_own_range or not self.has_common_length:
+        if not self.has_common_range:
             return self._run_own_ranges(march, fit), np.zeros(self.design_count, dtype=int)
         march, fit = self._lead_to_start(march, fit)
         if march.stops is None:

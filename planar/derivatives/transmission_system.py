@@ -112,8 +112,8 @@ class DrivenOutput:
                 raise BadInput(link, f"{link} is driven at its fixed pin, about which no force turns it")
             # beside the torque of one that it balances
             if np.max(couple[np.isfinite(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
-                told = f"at {join_all_names(names)} a couple drives {link} beside a force"
-                raise BadInput(link, f"{told}, so that no line of force through one pin tells a transmission angle")
+                reason = f"at {join_all_names(names)} a couple drives {link} beside a force"
+                raise BadInput(link, f"{reason}, so that no line of force through one pin tells a transmission angle")
         if reason:
             raise BadInput(link, f"{reason}, so that no one line of force with one pin tells a transmission angle")
 

@@ -376,15 +376,12 @@ def group_elements(placed_elements: Iterable[PlacedElement]) -> list[ElementGrou
 
 
 def pattern_of_groups(
-    groups: Sequence[ElementGroup], row_count: int, coordinate_count: int, transposed: bool = False
+    groups: Sequence[ElementGroup], row_count: int, coordinate_count: int
 ) -> tuple[SparsePattern, list[IntArray]]:
-    """Where the entries of dF/dq stand, or of its transpose, and of every group which of them its slopes are (elements,
-    rows, local coordinates); a link may be two bodies of a pair, whose slopes are then added up."""
-    shape = (coordinate_count, row_count) if transposed else (row_count, coordinate_count)
-    places = []
-    for group in groups:
-        rows, columns = group.rows[:, :, None], group.coordinates[:, None, :]
-        places.append((rows * shape[0] + columns if transposed else columns * shape[0] + rows).ravel())
+    """Where the entries of dF/dq stand, and of every group which of them its slopes are (elements, rows, local
+    coordinates); a link may be two bodies of a pair, whose slopes are then added up."""
+    shape = row_count, coordinate_count
+    places = [(group.coordinates[:, None, :] * row_count + group.rows[:, :, None]).ravel() for group in groups]
     entries, indices = np.unique(np.concatenate([np.zeros(0, dtype=int), *places]), return_inverse=True)
     columns, rows = np.divmod(entries, max(shape[0], 1))
     first = np.searchsorted(columns, np.arange(shape[1] + 1))

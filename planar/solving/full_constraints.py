@@ -11,15 +11,15 @@ from functools import cached_property
 import numpy as np
 
 from planar.equations.coordinates import FRAME_PARTS, consecutive_ranges, frames_from_coordinates
-from planar.equations.elements import ElementGroup, ElementPlacement, group_elements, pattern_of_groups
+from planar.equations.elements import ElementGroup, ElementPlacement, group_elements
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.equations.residuals import ConstraintRow, pair_residuals
-from planar.equations.sparse_matrices import MAX_DENSE_UNKNOWNS, SparseMatrices, SparsePattern
+from planar.equations.sparse_matrices import SparseMatrices
 from planar.equations.symbolic_equations import Block
 from planar.foundation.angles import wrap_angle
-from planar.foundation.arrays import Array, IntArray
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import fitted_frame
@@ -68,7 +68,6 @@ class FullConstraints:
         }
         self._groups: dict[tuple[str, ...], list[ElementGroup]] = {}
         "of all pairs, by the relative motions whose positions follow in the rows"
-        self._patterns: dict[tuple[str, ...], tuple[SparsePattern, list[IntArray]]] = {}
         "of their transposed Jacobians, by the same"
 
     def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
@@ -138,21 +137,6 @@ class FullConstraints:
         residuals[:, pair_rows:] -= positions
         residuals[:, self._angle_rows] = wrap_angle(residuals[:, self._angle_rows])
         return residuals.reshape(*w.shape[:-1], row_count), jacobian.reshape(*w.shape[:-1], row_count, w.shape[-1])
-
-    def transposed_jacobians(self, w: Array, held: tuple[str, ...] = ()) -> Array | SparseMatrices:
-        """The same Jacobian at positions w (n, coordinates), transposed (n, coordinates, rows): an array, or sparse
-        where coordinates are many."""
-        if len(self.coordinates) <= MAX_DENSE_UNKNOWNS:
-            return self.residuals_and_jacobian(w, held)[1].transpose(0, 2, 1)
-        groups = self._groups_with(held)
-        if held not in self._patterns:
-            row_count = len(self.pair_of_row) + len(held)
-            self._patterns[held] = pattern_of_groups(groups, row_count, len(self.coordinates), transposed=True)
-        pattern, entries_of_groups = self._patterns[held]
-        values: Array = np.zeros((len(pattern.rows), len(w)))
-        for group, entries in zip(groups, entries_of_groups, strict=True):
-            np.add.at(values, entries, np.moveaxis(group.evaluate(w, self._p)[1], 0, -1))
-        return SparseMatrices(pattern, values.T)
 
     @cached_property
     def _p(self) -> Array:

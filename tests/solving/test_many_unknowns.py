@@ -14,7 +14,7 @@ from planar.equations.functions import equation_functions
 from planar.equations.sparse_matrices import BorderedJacobian, SparseMatrices, SparsePattern, closing_step
 from planar.foundation.errors import NoAnswer
 from planar.foundation.private_cache import disable_cache
-from planar.solving import full_constraints, position, prepared_mechanism
+from planar.solving import position, prepared_mechanism
 from tests.builders import lift_document
 from tests.draws import first_cases
 from tests.known import MODELS
@@ -135,21 +135,6 @@ def test_runs_are_the_same_by_entries_and_by_arrays(stem, few_dense_unknowns):
         both = np.isfinite(one.angular_velocity) & np.isfinite(other.angular_velocity)
         assert np.mean(both) > 0.8
         np.testing.assert_allclose(one.angular_velocity[both], other.angular_velocity[both], atol=1e-6 * greatest)
-
-
-@pytest.mark.parametrize("stem", ["four-bar", "geared-five-bar", "planetary-gear-set", "tangent-cam", "v-twin-engine"])
-def test_the_jacobian_of_all_constraints_is_the_same_by_entries_and_by_arrays(stem, monkeypatch):
-    """Wheels of a gear, whose carrier may be one of its two links; a cam; pairs with coordinates of their own."""
-    setup = position.PositionSolver(MODELS[stem])
-    constraints = full_constraints.FullConstraints(setup)
-    held = tuple(given.pair for given in setup.mechanism.inputs)
-    w = np.random.default_rng(0).normal(size=(4, len(constraints.coordinates)))
-    arrays = constraints.transposed_jacobians(w, held)
-    assert isinstance(arrays, np.ndarray)
-    monkeypatch.setattr(full_constraints, "MAX_DENSE_UNKNOWNS", 1)
-    entries = constraints.transposed_jacobians(w, held)
-    assert isinstance(entries, SparseMatrices)
-    np.testing.assert_allclose(np.asarray(entries), arrays, rtol=1e-13, atol=1e-13)
 
 
 def test_the_transmission_angle_of_the_last_of_many_four_bars_is_that_of_coupler_and_rocker():

@@ -83,8 +83,10 @@ def _angles(
         _, link_count, force_count = reactions.equilibrium_matrix.shape
         is_way = (reactions.equilibrium.null_space[unknown] != 0.0).any(axis=1)
         if (force_count - is_way.sum(axis=1) == link_count).any():
-            told = f"constraints hold twice, so that the forces on {driven.link} are not determined without elasticity"
-            raise BadInput(driven.link, f"{told}; leave out the link that holds nothing new")
+            reason = (
+                f"constraints hold twice, so that the forces on {driven.link} are not determined without elasticity"
+            )
+            raise BadInput(driven.link, f"{reason}; leave out the link that holds nothing new")
     return through, angle
 
 
